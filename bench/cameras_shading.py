@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Images per CPU second with physically based and with classic shading.
 
-Everything that a view varies is changed before every image. One thread, 8 worlds, shadows; the update of the ray scene is included.
-Arguments are views to measure (panda_wrist); the default is VIEWS.
+Everything that a view varies is changed before every image. One thread, 8 worlds, shadows; the update of the ray scene is
+included. Arguments are views to measure (panda_wrist); the default is VIEWS.
 """
 
 from __future__ import annotations

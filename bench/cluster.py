@@ -6,10 +6,11 @@
     ./dev python bench/cluster.py --overhead          cost of a shard: 8 attempts as one shard and as eight
     ./dev python bench/cluster.py --memory            of a worker
     ./dev python bench/cluster.py --index 1000 100000 write and read of an index of so many shards
-    ./dev python bench/cluster.py --study             1,000,000 episodes on 1,000 workers, simulated with the figures measured here
+    ./dev python bench/cluster.py --study             1,000,000 episodes on 1,000 workers, simulated
+                                                      with the figures measured here
 
-A worker of the scaling test has one CPU for the simulation and its encoders. Without this limit a single worker would use the second CPU for
-its encoders, and the comparison would be one of 1.3 with 2 CPUs.
+A worker of the scaling test has one CPU for the simulation and its encoders. Without this limit a single worker would use the
+second CPU for its encoders, and the comparison would be one of 1.3 with 2 CPUs.
 """
 
 import argparse
@@ -54,7 +55,8 @@ def scaling(counts: list[int]) -> None:
         os.sched_setaffinity(0, every)
         first = first or summary.seconds * workers
         print(
-            f"{workers} workers on {workers} CPUs: {summary.seconds:.1f} s for {summary.kept} episodes, {first / summary.seconds:.2f} x one worker, "
+            f"{workers} workers on {workers} CPUs: {summary.seconds:.1f} s for {summary.kept} episodes, "
+            f"{first / summary.seconds:.2f} x one worker, "
             f"{peak:.0f} MB per worker"
         )
 
@@ -125,7 +127,8 @@ def index(shards: int, episodes: int) -> None:
         begun = time.perf_counter()
         assert len(read_index(Path(out))) == rows
         print(
-            f"index of {shards} shards with {episodes} episodes: {(Path(out) / 'index.parquet').stat().st_size / 1e6:.3f} MB, written in {wrote:.2f} s, "
+            f"index of {shards} shards with {episodes} episodes: "
+            f"{(Path(out) / 'index.parquet').stat().st_size / 1e6:.3f} MB, written in {wrote:.2f} s, "
             f"read in {time.perf_counter() - begun:.2f} s; driver's totals {added / shards * 1e6:.1f} us per shard"
         )
 
@@ -139,7 +142,8 @@ def study(workers: int, episodes: int) -> None:
     episode_mb, videos = 0.85, 2  # docs/formats.md, Sizes: 9.8 kB per observation
     rng = random.Random(0)
     print(
-        f"{'attempts per shard':>18} {'shards':>8} {'hours':>6} {'efficiency':>10} {'driver busy':>11} {'repeated':>9} {'surplus':>8} {'files, million':>14}"
+        f"{'attempts per shard':>18} {'shards':>8} {'hours':>6} {'efficiency':>10} {'driver busy':>11} "
+        f"{'repeated':>9} {'surplus':>8} {'files, million':>14}"
     )
     for size in (1, 4, 16, 64, 256):
         shards, ended, repeated, driver_free, done = -(-episodes // size), 0.0, 0.0, 0.0, 0
@@ -161,10 +165,12 @@ def study(workers: int, episodes: int) -> None:
         ideal = episodes * attempt_s / workers
         surplus = workers * size / episodes
         print(
-            f"{size:18} {shards:8} {ended / 3600:6.2f} {ideal / ended:10.1%} {busy / ended:11.1%} {repeated / 3600:7.2f} h {surplus:8.1%} {(episodes * (videos + 0.25) + 2 * shards) / 1e6:14.1f}"
+            f"{size:18} {shards:8} {ended / 3600:6.2f} {ideal / ended:10.1%} {busy / ended:11.1%} "
+            f"{repeated / 3600:7.2f} h {surplus:8.1%} {(episodes * (videos + 0.25) + 2 * shards) / 1e6:14.1f}"
         )
     print(
-        f"storage: {episodes * episode_mb / 1e6:.2f} TB, written at {episodes * episode_mb / (episodes * attempt_s / workers) / 1e3:.2f} GB/s"
+        f"storage: {episodes * episode_mb / 1e6:.2f} TB, written at "
+        f"{episodes * episode_mb / (episodes * attempt_s / workers) / 1e3:.2f} GB/s"
     )
 
 

@@ -3,8 +3,8 @@
 
     python bench/dataset.py [--width 640 --height 368] [--episodes 8] [--keep FOLDER]
 
-A sample contains qpos, the next actions and, with images, one frame of each of two cameras. Every case starts with empty caches; the
-order of the random samples is a permutation of all observations.
+A sample contains qpos, the next actions and, with images, one frame of each of two cameras. Every case starts with empty caches;
+the order of the random samples is a permutation of all observations.
 """
 
 import argparse

@@ -3,11 +3,11 @@
 
     python bench/drop_in.py [--sizes 84 256 640x480] [--json FILE] [--pictures FOLDER] [ENVIRONMENT ...]
 
-Needs the packages of the environments (those of tests/python/test_adapters.py), PyOpenGL and EGL; environments that cannot be made are skipped.
-Both renderers draw the same states, after one step each with a random action, through the environment's own function, in turns of 50 steps
-each. Times are medians of the images that differ from the one before; ratios are medians of the turns' ratios. The columns "step" are the
-CPU times of a step and its image. --pictures writes the last image of each environment and size, the package's own at the left, mjsense's at
-the right.
+Needs the packages of the environments (those of tests/python/test_adapters.py), PyOpenGL and EGL; environments that cannot be
+made are skipped. Both renderers draw the same states, after one step each with a random action, through the environment's own
+function, in turns of 50 steps each. Times are medians of the images that differ from the one before; ratios are medians of the
+turns' ratios. The columns "step" are the CPU times of a step and its image. --pictures writes the last image of each environment
+and size, the package's own at the left, mjsense's at the right.
 """
 
 from __future__ import annotations

@@ -3,8 +3,9 @@
 
     python bench/drop_in_builds.py BEFORE AFTER [--size 256] [--rounds 100] [ENVIRONMENT ...]
 
-BEFORE and AFTER are folders that contain the Python package mjsense of a build, such as copies of build/dev/python (`cp -rL`). Each build has
-a process of its own. They draw the same states in turns of four images; the ratio is the median of the turns' ratios.
+BEFORE and AFTER are folders that contain the Python package mjsense of a build, such as copies of build/dev/python (`cp -rL`).
+Each build has a process of its own. They draw the same states in turns of four images; the ratio is the median of the turns'
+ratios.
 """
 
 from __future__ import annotations

@@ -3,9 +3,10 @@
 
     python bench/drop_in_quality.py [--size 256] [--pictures FOLDER] [--json FILE] [ENVIRONMENT ...]
 
-Needs what bench/drop_in.py needs; LIBERO needs an environment of its own, because it needs another robosuite. The colours are those of the environment's own function after two steps; depth and segmentation are those of
-mujoco.Renderer and mjsense.Renderer with the same model, data and camera. Each environment is drawn in a process of its own. The last line
-but one lists the medians, the last one the environments below the bounds. --pictures writes both images and their difference.
+Needs what bench/drop_in.py needs; LIBERO needs an environment of its own, because it needs another robosuite. The colours are
+those of the environment's own function after two steps; depth and segmentation are those of mujoco.Renderer and mjsense.Renderer
+with the same model, data and camera. Each environment is drawn in a process of its own. The last line but one lists the medians,
+the last one the environments below the bounds. --pictures writes both images and their difference.
 """
 
 from __future__ import annotations
@@ -28,14 +29,18 @@ from images import ssim, write_sheet
 # While numba compiles robosuite's functions, once after an installation, the images of software OpenGL (Mesa 22.3) are wrong.
 os.environ.setdefault("NUMBA_DISABLE_JIT", "1")
 
-GYMNASIUM = """Ant-v5 HalfCheetah-v5 Hopper-v5 Humanoid-v5 HumanoidStandup-v5 InvertedDoublePendulum-v5 InvertedPendulum-v5 Pusher-v5
-    Reacher-v5 Swimmer-v5 Walker2d-v5 AdroitHandDoor-v1 AdroitHandHammer-v1 AdroitHandPen-v1 AdroitHandRelocate-v1 AntMaze_UMaze-v5
+GYMNASIUM = """Ant-v5 HalfCheetah-v5 Hopper-v5 Humanoid-v5 HumanoidStandup-v5 InvertedDoublePendulum-v5 InvertedPendulum-v5
+    Pusher-v5
+    Reacher-v5 Swimmer-v5 Walker2d-v5 AdroitHandDoor-v1 AdroitHandHammer-v1 AdroitHandPen-v1 AdroitHandRelocate-v1
+    AntMaze_UMaze-v5
     FetchPickAndPlace-v4 FetchPush-v4 FetchReach-v4 FetchSlide-v4 FrankaKitchen-v1 HandManipulateBlock-v1 HandManipulateEgg-v1
     HandManipulatePen-v1 HandReach-v3 PointMaze_UMaze-v3"""
 META_WORLD = "button-press-topdown-v3 door-open-v3 drawer-open-v3 hammer-v3 peg-insert-side-v3 push-v3 reach-v3 window-open-v3"
-DM_CONTROL = """acrobot/swingup ball_in_cup/catch cartpole/swingup cheetah/run dog/stand finger/spin fish/swim hopper/hop humanoid/stand
+DM_CONTROL = """acrobot/swingup ball_in_cup/catch cartpole/swingup cheetah/run dog/stand finger/spin fish/swim hopper/hop
+    humanoid/stand
     manipulator/bring_ball quadruped/walk reacher/easy swimmer/swimmer6 walker/walk"""
-ROBOSUITE = """Door/agentview Lift/agentview Lift/robot0_eye_in_hand NutAssembly/agentview PickPlace/agentview PickPlace/robot0_eye_in_hand
+ROBOSUITE = """Door/agentview Lift/agentview Lift/robot0_eye_in_hand NutAssembly/agentview PickPlace/agentview
+    PickPlace/robot0_eye_in_hand
     Stack/agentview ToolHang/agentview Wipe/agentview"""
 LIBERO = "libero_spatial/0/agentview libero_object/0/agentview libero_goal/0/agentview libero_10/0/robot0_eye_in_hand"
 ENVIRONMENTS = [

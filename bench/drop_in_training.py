@@ -3,8 +3,8 @@
 
     python bench/drop_in_training.py [--mjsense] [--steps 4096] [--environment HalfCheetah-v5]
 
-Stable-Baselines3's PPO with a convolutional network learns from images of 84 x 84 pixels of 8 environments in subprocesses. --mjsense changes
-one line, the one with `use`. Needs stable-baselines3, and without --mjsense OpenGL.
+Stable-Baselines3's PPO with a convolutional network learns from images of 84 x 84 pixels of 8 environments in subprocesses.
+--mjsense changes one line, the one with `use`. Needs stable-baselines3, and without --mjsense OpenGL.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compares video encoders with the one that recordings use (libx264, veryfast, crf 25, no B-frames, a key frame every 20 frames, tuned for fast decoding) in CPU time at similar quality and size.
+"""Compares video encoders with the one that recordings use (libx264, veryfast, crf 25, no B-frames, a key frame every 20 frames,
+tuned for fast decoding) in CPU time at similar quality and size.
 
 Four videos of the default pick task (two cameras in two episodes) are recorded losslessly and encoded by each of ffmpeg's
 encoders on one thread, with settings that give about the same PSNR. CPU time includes the start of ffmpeg and reading the frames,

@@ -50,7 +50,8 @@ def attach() -> None:
         attached.reset()
         both = microseconds(update, 2000)
     print(
-        f"attach, quadruped with contacts and IMU: update {both - step:.0f} us, mj_forward {microseconds(lambda: mujoco.mj_forward(model, data), 2000):.0f} us"
+        f"attach, quadruped with contacts and IMU: update {both - step:.0f} us, mj_forward "
+        f"{microseconds(lambda: mujoco.mj_forward(model, data), 2000):.0f} us"
     )
 
 
@@ -72,7 +73,8 @@ def record_episodes() -> None:
             costs.append(run(env, steps))
             env.close()
     print(
-        f"RecordEpisodes, Pendulum-v1, episodes of 200 steps: {statistics.median(costs) - alone:.0f} us per step, with the files of its episodes"
+        f"RecordEpisodes, Pendulum-v1, episodes of 200 steps: {statistics.median(costs) - alone:.0f} us per step, "
+        "with the files of its episodes"
     )
 
 

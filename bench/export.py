@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Export to LeRobot; reading and writing: mjs.Dataset compared with LeRobot's loader, and the recorder's encoder with LeRobot's writer.
+"""Export to LeRobot; reading and writing: mjs.Dataset compared with LeRobot's loader, and the recorder's encoder with LeRobot's
+writer.
 
     python bench/export.py [--width 640 --height 368] [--episodes 8] [--keep FOLDER] [--lerobot PYTHON] [--only-export]
 
-A sample contains the state, the action and one frame of each of two cameras. Every case starts with empty caches. The two loaders run in
-turn, each in a process of its own; LeRobot's environment is the one that tests/python/test_lerobot.py makes. Rates are per second of wall
-clock, and in parentheses per second of CPU time, which other programs of the machine disturb less.
+A sample contains the state, the action and one frame of each of two cameras. Every case starts with empty caches. The two loaders
+run in turn, each in a process of its own; LeRobot's environment is the one that tests/python/test_lerobot.py makes. Rates are per
+second of wall clock, and in parentheses per second of CPU time, which other programs of the machine disturb less.
 """
 
 import argparse
@@ -41,7 +42,8 @@ def read(root: Path, order: str, seconds: float, cache_mb: float) -> None:
 
 
 def export(root: Path, out: Path) -> None:
-    """Exports all episodes to the folder ``complete`` of ``out``, and those without idle steps, whose videos are encoded again, to ``trimmed``."""
+    """Exports all episodes to the folder ``complete`` of ``out``, and those without idle steps, whose videos are encoded again,
+    to ``trimmed``."""
     shutil.rmtree(out, ignore_errors=True)
     mjs.exporting.export_lerobot(root, out / "warm", episodes=[0])  # imports the libraries
     shutil.rmtree(out)

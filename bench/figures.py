@@ -184,7 +184,8 @@ def row_of(notes: str, figure: Figure) -> tuple[str, str, str, str]:
     row = next((row for row in lines[2:] if row[0] == figure.case), None)
     if row is None or figure.column not in heading:
         raise LookupError(
-            f"docs/performance_notes.md: the table of '{figure.benchmark}' has no row '{figure.case}' with a column '{figure.column}'"
+            f"docs/performance_notes.md: the table of '{figure.benchmark}' has no row '{figure.case}' with a column "
+            f"'{figure.column}'"
         )
     other = re.fullmatch(r"(\S+) \((\S+) x\)", row[heading.index(figure.column)])
     if other is None:

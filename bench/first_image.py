@@ -3,10 +3,10 @@
 
     python bench/first_image.py [--size 84x84] [--count 7] [ENVIRONMENT ...]
 
-Needs robosuite or the packages of other environments of bench/drop_in.py, PyOpenGL and EGL. Each measurement has a process of its own, which loads the
-model and imports both packages before the time begins; the two renderers take turns. "construct" is `Renderer(model)`, "image" the first
-`update_scene` and `render`, "next" the same once more. CPU times of all threads in ms, medians. The last column has
-a hash of the image, by which builds can be compared.
+Needs robosuite or the packages of other environments of bench/drop_in.py, PyOpenGL and EGL. Each measurement has a process of its
+own, which loads the model and imports both packages before the time begins; the two renderers take turns. "construct" is
+`Renderer(model)`, "image" the first `update_scene` and `render`, "next" the same once more. CPU times of all threads in ms,
+medians. The last column has a hash of the image, by which builds can be compared.
 """
 
 from __future__ import annotations
@@ -107,7 +107,8 @@ def main() -> None:
             median = {key: statistics.median(row[key] for row in found) for key in ("construct", "image", "next")}
             together = statistics.median(row["construct"] + row["image"] for row in found)
             print(
-                f"{name:32s} {kind:9s} {median['construct']:9.1f} {median['image']:8.1f} {together:8.1f} {median['next']:8.2f}  {found[0]['hash']}",
+                f"{name:32s} {kind:9s} {median['construct']:9.1f} {median['image']:8.1f} {together:8.1f} "
+                f"{median['next']:8.2f}  {found[0]['hash']}",
                 flush=True,
             )
 

@@ -3,10 +3,11 @@
 
     python bench/molmospaces.py [--size 640x480] [--count 20] [MODEL.xml ...]
 
-Needs the environment build/molmospaces of tests/python/test_adapters.py, and EGL. By default 20 models of gymnasium, gymnasium-robotics and
-dm_control. Both renderers draw the same states with the same camera, in turns; each time is the CPU time of ``update`` and ``render``, the
-median of all states. Columns: PSNR of rgb in dB, median error of depth in mm where it is below half the far plane, share of pixels that show the same
-object, and milliseconds of molmo-spaces and mjsense with their ratio for each kind of image. nan: molmo-spaces cannot draw the segmentation of the model.
+Needs the environment build/molmospaces of tests/python/test_adapters.py, and EGL. By default 20 models of gymnasium,
+gymnasium-robotics and dm_control. Both renderers draw the same states with the same camera, in turns; each time is the CPU time
+of ``update`` and ``render``, the median of all states. Columns: PSNR of rgb in dB, median error of depth in mm where it is below
+half the far plane, share of pixels that show the same object, and milliseconds of molmo-spaces and mjsense with their ratio for
+each kind of image. nan: molmo-spaces cannot draw the segmentation of the model.
 """
 
 from __future__ import annotations

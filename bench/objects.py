@@ -4,8 +4,8 @@
     python bench/objects.py --attempts 4 --pattern "rgb_.*"
     python bench/objects.py --attempts 0 --sheet objects.png
 
-Every object lies alone on the varied table with a bowl and a plate. Excluded objects and those whose package is not installed are left
-out.
+Every object lies alone on the varied table with a bowl and a plate. Excluded objects and those whose package is not installed are
+left out.
 """
 
 from __future__ import annotations

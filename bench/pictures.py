@@ -88,7 +88,8 @@ def compare(name: str, camera: str, folder: pathlib.Path) -> None:
     mse = ((rgb.astype(float) - peer_rgb) ** 2).mean()
     print(
         f"| {name} {camera} | {np.median(error) * 1e3:.1e} mm | {100 * (error > 0.01).mean():.3f} % "
-        f"| {100 * (ids == peer_ids).all(axis=-1).mean():.2f} % | {ssim(rgb, peer_rgb):.3f} | {10 * np.log10(255**2 / mse):.1f} dB |"
+        f"| {100 * (ids == peer_ids).all(axis=-1).mean():.2f} % | {ssim(rgb, peer_rgb):.3f} | "
+        f"{10 * np.log10(255**2 / mse):.1f} dB |"
     )
     difference = np.clip(3 * np.abs(rgb.astype(int) - peer_rgb), 0, 255).astype(np.uint8)
     write_png(folder / f"{name}_{camera}.png", np.concatenate([rgb, peer_rgb, difference], axis=1))

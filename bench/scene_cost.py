@@ -2,8 +2,8 @@
 """What each part of the default scenes costs in recording speed: python bench/scene_cost.py [--rounds 5] [--size 640x368]
 
 Records `pick` with Franka and two cameras, and prints for each variant of the scene the median CPU time of a step, with start of
-the episode, physics, planner, images and encoding, and its ratio to the plain scene. The ratio is the median over rounds, in which the
-variants take turns. A variant whose objects come from a package is skipped if the package is not installed.
+the episode, physics, planner, images and encoding, and its ratio to the plain scene. The ratio is the median over rounds, in
+which the variants take turns. A variant whose objects come from a package is skipped if the package is not installed.
 """
 
 import argparse

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of x264 for recordings: size, quality, time of encoding, and time of decoding a frame at random. The table of docs/formats.md.
+"""Settings of x264 for recordings: size, quality, time of encoding, and time of decoding a frame at random. The table of
+docs/formats.md.
 
     python bench/video_settings.py
 
-The four videos of two episodes of `pick` (two cameras of 640x368) are recorded with crf 0 and encoded with each setting on one thread. CPU
-time of encoding includes the start of ffmpeg. Decoding is that of `mjs.Dataset` without its cache, for both cameras, least of three runs.
+The four videos of two episodes of `pick` (two cameras of 640x368) are recorded with crf 0 and encoded with each setting on one
+thread. CPU time of encoding includes the start of ffmpeg. Decoding is that of `mjs.Dataset` without its cache, for both cameras,
+least of three runs.
 """
 
 import pathlib
@@ -64,7 +66,8 @@ def random_ms(path: pathlib.Path) -> float:
 
 def main() -> None:
     print(
-        "| setting | bytes per frame | CPU ms per frame | PSNR exo, wrist, dB | CPU ms of a random frame of both cameras |\n| --- | ---: | ---: | ---: | ---: |"
+        "| setting | bytes per frame | CPU ms per frame | PSNR exo, wrist, dB | CPU ms of a random frame of both "
+        "cameras |\n| --- | ---: | ---: | ---: | ---: |"
     )
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(scratch)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs situations in which mjlab's sensors are wrong with mjlab and with mjsense's backend="warp", and prints a table of the results.
+"""Runs situations in which mjlab's sensors are wrong with mjlab and with mjsense's backend="warp", and prints a table of the
+results.
 
 pip install mjlab==1.6.0 --no-deps              # it asks for mujoco_warp 3.11; it works with 4.0
 python bench/warp_defects.py [--device cuda:0]

@@ -3,8 +3,9 @@
 
     python bench/warp_sensors.py [--device cuda:0] [--worlds 64]
 
-Both programs have the same worlds in the same states, and take turns. A time is that of one update of the sensor for all worlds: CPU
-time of the process, or, on a CUDA device, time until the device has finished, without a graph. mjlab 1.6 asks for mujoco_warp 3.11; it works with 4.0 (pip install --no-deps).
+Both programs have the same worlds in the same states, and take turns. A time is that of one update of the sensor for all worlds:
+CPU time of the process, or, on a CUDA device, time until the device has finished, without a graph. mjlab 1.6 asks for mujoco_warp
+3.11; it works with 4.0 (pip install --no-deps).
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ SIZE = 32  # pixels of the camera's sides
 
 def robot() -> mujoco.MjSpec:
     legs = "".join(
-        f'<body pos="{x} {y} 0"><joint name="hip{i}" axis="0 1 0"/><geom type="capsule" size=".02" fromto="0 0 0 0 0 -.25" group="3"/>'
+        f'<body pos="{x} {y} 0"><joint name="hip{i}" axis="0 1 0"/><geom type="capsule" size=".02" fromto="0 0 0 0 '
+        '0 -.25" group="3"/>'
         f'<geom name="foot{i}" size=".03" pos="0 0 -.28" group="3"/></body>'
         for i, (x, y) in enumerate([(0.2, 0.1), (0.2, -0.1), (-0.2, 0.1), (-0.2, -0.1)])
     )

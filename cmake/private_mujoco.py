@@ -3,8 +3,8 @@
 
     private_mujoco.py MUJOCO_FOLDER LIBMUJOCO OUTPUT_FOLDER
 
-The dynamic linker identifies a library by its SONAME. With a name of its own, the copy and the libmujoco of any installed `mujoco` can
-be loaded into one process. Only strings of the dynamic section are changed; no code.
+The dynamic linker identifies a library by its SONAME. With a name of its own, the copy and the libmujoco of any installed
+`mujoco` can be loaded into one process. Only strings of the dynamic section are changed; no code.
 """
 
 from __future__ import annotations
@@ -29,7 +29,11 @@ def renamed(image: bytearray, old: bytes, new: bytes) -> bytearray:
     headers = [struct.unpack_from("<IIQQQQ", image, table + i * size) for i in range(count)]
 
     def offset(address: int) -> int:
-        return next(at + address - start for kind, _, at, start, _, length in headers if kind == PT_LOAD and start <= address < start + length)
+        return next(
+            at + address - start
+            for kind, _, at, start, _, length in headers
+            if kind == PT_LOAD and start <= address < start + length
+        )
 
     place, length = next((at, length) for kind, _, at, _, _, length in headers if kind == PT_DYNAMIC)
     entries = [struct.unpack_from("<QQ", image, at) for at in range(place, place + length, 16)]

@@ -2,8 +2,8 @@
 """MkDocs hook: adds the pages that live outside docs/ and expands `folder/*` in the navigation.
 
 The page of a sensor, task, policy or robot lies next to its code (src/mjsense/sensors/*/page.md and so on). CHANGELOG.md and
-CONTRIBUTING.md are read from the root of the repository. Links in the sources lead to files of the repository, so that they work on a code
-host too; on the site they lead to its pages.
+CONTRIBUTING.md are read from the root of the repository. Links in the sources lead to files of the repository, so that they work
+on a code host too; on the site they lead to its pages.
 """
 
 import os
@@ -20,7 +20,8 @@ FROM_ROOT = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md
 INTRODUCTIONS = {
     "sensors": "One page for each kind of sensor: what it measures, an example, its fields, its cost and its configuration.",
     "robots": "Pages of the robots that have one. `mjsense robots` lists all of them.",
-    "tasks": "What each task asks for: start, success, reward and the sensors that it adds. [Tasks and planners](../tasks.md) compares them.",
+    "tasks": "What each task asks for: start, success, reward and the sensors that it adds. [Tasks and "
+    "planners](../tasks.md) compares them.",
     "policies": "Policies that have a page of their own. The general planner is described in [Tasks and planners](../tasks.md).",
 }
 
@@ -97,7 +98,10 @@ def on_files(files, config):
             for picture in sorted([*page.parent.glob("*.svg"), *page.parent.glob("*.png")]):
                 add(f"{folder}/{picture.name}", picture.read_bytes())
         rows = "".join(f"| [{title(page).split(':')[0]}]({page.parent.name}.md) | {description(page)} |\n" for page in pages)
-        add(f"{folder}/index.md", f"# {folder.capitalize()}\n\n{INTRODUCTIONS[folder]}\n\n| page | summary |\n| --- | --- |\n{rows}")
+        add(
+            f"{folder}/index.md",
+            f"# {folder.capitalize()}\n\n{INTRODUCTIONS[folder]}\n\n| page | summary |\n| --- | --- |\n{rows}",
+        )
         folders[folder] = [f"{folder}/index.md", *(f"{folder}/{page.parent.name}.md" for page in pages)]
     for folder in SINGLE:
         add(f"{folder}.md", linked((page := SOURCE / folder / "page.md").read_text(), page))

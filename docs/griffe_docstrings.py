@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Griffe extension: turns the reStructuredText marks of our docstrings (roles, double backticks, `::`) into Markdown, gives the
-configurations (`mjsense.core.lazy_dataclass`) the signature that their fields make, and shows components of the state (`_State("text")`) as arrays.
-Members of a private base class in the same module are shown as those of the class."""
+configurations (`mjsense.core.lazy_dataclass`) the signature that their fields make, and shows components of the state
+(`_State("text")`) as arrays. Members of a private base class in the same module are shown as those of the class."""
 
 import ast
 import copy
@@ -15,7 +15,11 @@ import griffe
 ROLE = re.compile(r":(?:class|func|meth|mod|attr):`~?([\w.]+)`")
 
 _MODULE = ast.parse((Path(__file__).parents[1] / "python/mjsense/core/old_names.py").read_text())
-_MOVED = next(ast.literal_eval(node.value) for node in _MODULE.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "MOVED")
+_MOVED = next(
+    ast.literal_eval(node.value)
+    for node in _MODULE.body
+    if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "MOVED"
+)
 ROOMS = {name: room for room, names in _MOVED.items() for name in names}
 """Modules of the public names that are not at the top of the package."""
 
@@ -44,8 +48,12 @@ class Docstrings(griffe.Extension):
                         cls.set_member(name, copy.copy(base.members[name]))
                 cls.bases = [base for base in cls.bases if "._" not in getattr(base, "canonical_path", "")]  # private ones
                 if any("lazy_dataclass.dataclass" in d.callable_path for d in cls.decorators):
-                    parameters = [griffe.Parameter(f.name, annotation=f.annotation, kind=griffe.ParameterKind.positional_or_keyword,
-                                                   default=default(f)) for f in fields(cls)]  # fmt: skip
+                    parameters = [
+                        griffe.Parameter(
+                            f.name, annotation=f.annotation, kind=griffe.ParameterKind.positional_or_keyword, default=default(f)
+                        )
+                        for f in fields(cls)
+                    ]
                     for name in [n for n, a in cls.attributes.items() if not a.is_alias and "ClassVar" in str(a.annotation)]:
                         cls.del_member(name)
                     own = griffe.Parameter("self", kind=griffe.ParameterKind.positional_or_keyword)

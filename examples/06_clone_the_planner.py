@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Record picks, train a network to do what the planner did, and count how often it picks in episodes that it has not seen.
 
-Minutes on two cores, without a picture: it sees the joints, and where its object is in the frame of its tool. The scene is the plain
-table, and grasps come from above: what is easiest to learn.
+Minutes on two cores, without a picture: it sees the joints, and where its object is in the frame of its tool. The scene is the
+plain table, and grasps come from above: what is easiest to learn.
 
     pip install "mjsense[torch,dataset,evaluate]"
     python examples/06_clone_the_planner.py [--out clone] [--recorded 200] [--judged 200] [--passes 120]
 
-The folder keeps the recordings of the demonstrations and of the judged episodes, with a report of each, and the network, which the program
-evaluates too:
+The folder keeps the recordings of the demonstrations and of the judged episodes, with a report of each, and the network, which
+the program evaluates too:
 
-    mjsense evaluate pick --scene table --policy examples/06_clone_the_planner.py:ClonePolicy --policy-option net=clone/network.pt --out results
+    mjsense evaluate pick --scene table --policy examples/06_clone_the_planner.py:ClonePolicy \\
+        --policy-option net=clone/network.pt --out results
 """
 
 import argparse
@@ -47,8 +48,8 @@ def matrices(quat):
 def features(arm, fingers, speed, tool, actors, target):
     """What the network sees: float32 ``[N, F]``.
 
-    arm ``[N, 7]``, fingers ``[N]`` rad, speed ``[N]`` of the fingers rad/s, tool ``[N, 7]`` in the base frame, which on this table is the
-    world's, actors ``[8, N, 13]``, target ``[N]``: which of them is meant.
+    arm ``[N, 7]``, fingers ``[N]`` rad, speed ``[N]`` of the fingers rad/s, tool ``[N, 7]`` in the base frame, which on this
+    table is the world's, actors ``[8, N, 13]``, target ``[N]``: which of them is meant.
     """
     thing = actors[target, np.arange(len(target)), :7]
     R, turn = matrices(tool[:, 3:]), matrices(thing[:, 3:])

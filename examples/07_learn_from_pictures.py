@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Record picks, train a network on two cameras, and count how often it picks in episodes that it has not seen.
 
-The network receives the images of the outer camera of `close_up` and of the wrist camera (128x96), the pose of the tool, the opening of
-the gripper, and the words of the instruction. It receives no pose of an object. It returns a chunk: the poses of the tool in the next 12
-steps, relative to the present one, and whether the gripper closes. Two auxiliary losses use what recordings contain: where in the images
-the objects are, and at which pose of the tool the demonstration closed the gripper.
+The network receives the images of the outer camera of `close_up` and of the wrist camera (128x96), the pose of the tool, the
+opening of the gripper, and the words of the instruction. It receives no pose of an object. It returns a chunk: the poses of the
+tool in the next 12 steps, relative to the present one, and whether the gripper closes. Two auxiliary losses use what recordings
+contain: where in the images the objects are, and at which pose of the tool the demonstration closed the gripper.
 
     pip install "mjsense[torch,dataset,evaluate]"
     python examples/07_learn_from_pictures.py [--episodes 200] [--steps 3500] [--judged 200]
 
 The program evaluates the network too:
 
-    mjsense evaluate pick --policy examples/07_learn_from_pictures.py:Follower --policy-option network=pictures/network.pt --out results \\
-        --robot franka --size 128x96 --camera-system close_up --arm-controller "{ kind = 'ee_delta_pose', frame = 'tool', reference = 'measured', max_translation = 0.15, max_rotation = 1.0 }"
+    mjsense evaluate pick --policy examples/07_learn_from_pictures.py:Follower --policy-option network=pictures/network.pt \\
+        --out results --robot franka --size 128x96 --camera-system close_up --arm-controller \\
+        "{ kind = 'ee_delta_pose', frame = 'tool', reference = 'measured', max_translation = 0.15, max_rotation = 1.0 }"
 """
 
 import argparse
@@ -37,14 +38,15 @@ SHIFT = {"exo_camera_1": 4, "wrist_camera": 2}  # pixels; images are shifted at 
 CHUNK = 12  # steps that the network predicts
 STEPS = 120  # of an episode that is judged; the planner needs 60 to 110
 HELD = 5  # steps; an object that is knocked over may be off the table for a moment
-# Disturbs the state in training, so that the network does not read the goal from the path of the tool, which would confirm its own errors.
+# Disturbs the state in training, so that the network does not read the goal from the path of the tool, which would confirm its
+# own errors.
 STATE_NOISE = torch.tensor([0.04, 0.04, 0.005] + [0.1] * 6 + [0.03])
 OPENING, CLOSED = 0.8, 255.0  # rad of the closed fingers, command that closes them
 LIMITS = np.array([0.15] * 3 + [1.0] * 3)  # of a move: m, rad
 CONTROLLER = "{ kind = 'ee_delta_pose', frame = 'tool', reference = 'measured', max_translation = 0.15, max_rotation = 1.0 }"
 
 
-# --------------------------------------------------------------------- poses [..., 7]: m and wxyz; moves [..., 6]: m and rotation vector
+# --------------------------------------------------- poses [..., 7]: m and wxyz; moves [..., 6]: m and rotation vector
 
 
 def multiply(a, b):
@@ -84,14 +86,14 @@ def state(tool, fingers):
     return np.concatenate([tool[:, :3], *axes, fingers[:, None] / OPENING], 1).astype(np.float32)
 
 
-# ------------------------------------------------------------------------------------------------------------------------- demonstrations
+# ------------------------------------------------------------------------------------------------------ demonstrations
 
 
 def record(out, episodes):
     """Path of new demonstrations.
 
-    The robot is `franka` with 25 times its action noise. The actions, which are recorded without noise, lead back to the path, so that
-    the network learns to correct its own errors.
+    The robot is `franka` with 25 times its action noise. The actions, which are recorded without noise, lead back to the path, so
+    that the network learns to correct its own errors.
     """
     text = (MODELS / "robot.toml").read_text().replace('model = "', f'model = "{MODELS}/')
     robot = Path(out) / "franka_with_noise.toml"
@@ -114,10 +116,10 @@ def record(out, episodes):
 class Demonstrations:
     """All observations of a recording, with the actions that followed.
 
-    ``images[camera]`` uint8 ``[N, H, W, 3]``; ``points[camera]`` ``[N, K, 2]``: where the K objects are in the image, in pixels, NaN if
-    they are absent; ``kinds`` ``[K, V]``: the words of their instructions; ``kind`` ``[N]``: the object of the instruction; ``state``
-    ``[N, 10]``; ``moves`` ``[N, CHUNK + 1, 6]`` to the next targets of the tool and to the one at which the gripper closes; ``close``
-    ``[N, CHUNK]``: whether the gripper closes; ``before`` ``[N]``: whether it has yet to close.
+    ``images[camera]`` uint8 ``[N, H, W, 3]``; ``points[camera]`` ``[N, K, 2]``: where the K objects are in the image, in pixels,
+    NaN if they are absent; ``kinds`` ``[K, V]``: the words of their instructions; ``kind`` ``[N]``: the object of the
+    instruction; ``state`` ``[N, 10]``; ``moves`` ``[N, CHUNK + 1, 6]`` to the next targets of the tool and to the one at which
+    the gripper closes; ``close`` ``[N, CHUNK]``: whether the gripper closes; ``before`` ``[N]``: whether it has yet to close.
     """
 
     def __init__(self, path, episodes=None):
@@ -174,7 +176,7 @@ def bag(text, vocabulary):
     return np.isin(vocabulary, text.lower().split()).astype(np.float32)
 
 
-# -------------------------------------------------------------------------------------------------------------------------------- network
+# ------------------------------------------------------------------------------------------------------------- network
 
 
 class Encoder(nn.Module):
@@ -194,7 +196,8 @@ class Encoder(nn.Module):
         self.size = 2 * points + channels + 1
 
     def forward(self, image, words):
-        """Features ``[B, size]`` and log-probabilities of the object's cell ``[B, cells + 1]``; the last means that it is not visible."""
+        """Features ``[B, size]`` and log-probabilities of the object's cell ``[B, cells + 1]``; the last means that it is not
+        visible."""
         n = len(image)
         x = image.reshape(n, self.rows, self.cell, self.columns, self.cell, 3)
         x = x.permute(0, 2, 4, 5, 1, 3).reshape(n, -1, self.rows, self.columns)
@@ -227,7 +230,8 @@ class Network(nn.Module):
             self.register_buffer(f"{name}_scale", scale[name])
 
     def forward(self, images, state, words):
-        """Normalised moves ``[B, CHUNK + 1, 6]``, logits of closing ``[B, CHUNK]``, log-probabilities of the object's cell by camera."""
+        """Normalised moves ``[B, CHUNK + 1, 6]``, logits of closing ``[B, CHUNK]``, log-probabilities of the object's cell by
+        camera."""
         features, where = [(state - self.state_mean) / self.state_scale, words], {}
         for camera, encoder in self.encoders.items():
             found, where[camera] = encoder(images[camera], words)
@@ -301,7 +305,7 @@ def train(network, data, steps, batch=64):
     return network.eval()
 
 
-# ----------------------------------------------------------------------------------------------------------------------------- evaluation
+# ---------------------------------------------------------------------------------------------------------- evaluation
 
 
 class Follower:
@@ -347,8 +351,8 @@ def loaded(path):
 
 
 def evaluate(network, episodes, out, scene="", seed=10_000, worlds=50):
-    """Results of some unseen episodes: ``[episodes]``, whether the robot held the object above the table for HELD steps without a break, and
-    whether the training contained all words of the instruction."""
+    """Results of some unseen episodes: ``[episodes]``, whether the robot held the object above the table for HELD steps without a
+    break, and whether the training contained all words of the instruction."""
     results = mjs.evaluate(
         "pick",
         "franka",
@@ -390,7 +394,8 @@ def main():
     print(f"trained: {won.sum()} of {len(won)} unseen episodes ({low:.0%} to {high:.0%})", flush=True)
     if not known.all():
         print(
-            f"  {won[~known].sum()} of {np.sum(~known)} whose instructions have unknown words, {won[known].sum()} of {known.sum()} others"
+            f"  {won[~known].sum()} of {np.sum(~known)} whose instructions have unknown words, {won[known].sum()} "
+            f"of {known.sum()} others"
         )
 
 

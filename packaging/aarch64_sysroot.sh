@@ -22,7 +22,7 @@ done
 
 # The libraries that apt.txt names, the C library, and a Python that creates virtual environments. The compilers run on this machine.
 packages="$(sed 's/#.*//' apt.txt | grep -oE '^(lib|zlib|nlohmann|python3)[^ ]*' | grep -v '^libgl1-mesa-dri')
-  libc6-dev libstdc++-12-dev libpython3.11 bash coreutils"
+  libc6-dev libstdc++-12-dev libpython3.11 bash coreutils dash"
 # Packages that mujoco-core, NumPy, Gymnasium, the binding library and the tests of recordings bring, as for the development environment.
 wheels="mujoco-core==$("$python" -c 'import importlib.metadata as m; print(m.version("mujoco-core"))') \
   $(sed 's/#.*//' requirements.txt | grep -E '^(numpy|gymnasium|nanobind-backend|h5py|pytest>)' | tr -d ' ') imageio-ffmpeg"

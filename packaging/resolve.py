@@ -39,8 +39,20 @@ class Unavailable(RuntimeError):
 
 def resolve(others: list[str]) -> dict[str, str]:
     """Name -> version of every package; ValueError with pip's message if the requirements conflict."""
-    command = [sys.executable, "-m", "pip", "install", "--dry-run", "--ignore-installed", "--quiet", "--disable-pip-version-check",
-               "--only-binary=:all:", "--report=-", *PROJECT["dependencies"], *others]  # fmt: skip
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--dry-run",
+        "--ignore-installed",
+        "--quiet",
+        "--disable-pip-version-check",
+        "--only-binary=:all:",
+        "--report=-",
+        *PROJECT["dependencies"],
+        *others,
+    ]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         said = done.stderr.strip()

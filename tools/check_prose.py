@@ -61,7 +61,8 @@ PHRASES = {
     r"\bthe least of\b|\bthe most of\b|\bat the most\b|\bat the least\b": "minimum, maximum, at most, at least",
     r"\bas it is there\b|\bas of ours\b": "use plain words",
     r"\bgive (?:--|out)": "pass",
-    r"(?:^|[.:;|] |[\"'])What (?!is new)(?:nobody|nothing|cannot|can|a|is|are|does|has|they|it|others|lies|stands)\b[^.?!|]*\b(?:is|are|costs|stays)\b": "begin the sentence with its subject",
+    r"(?:^|[.:;|] |[\"'])What (?!is new)(?:nobody|nothing|cannot|can|a|is|are|does|has|they|it|others|lies|stands)\b"
+    r"[^.?!|]*\b(?:is|are|costs|stays)\b": "begin the sentence with its subject",
 }
 RULES = [(re.compile(pattern, re.IGNORECASE), advice) for pattern, advice in PHRASES.items()]
 

@@ -1,17 +1,20 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the includes between rooms (the folders of src/mjsense and src/mjsense_tasks), whose order the tables in docs/architecture.md
-define, the namespaces of rooms, and the imports between the rooms of the Python package (the folders of python/mjsense).
+"""Checks the includes between rooms (the folders of src/mjsense and src/mjsense_tasks), whose order the tables in
+docs/architecture.md define, the namespaces of rooms, and the imports between the rooms of the Python package (the folders of
+python/mjsense).
 
-A file may include headers of its own room and of the rooms above it in those tables; thus the first library does not depend on the second.
-Tests, benchmarks and folders testing/ may include headers of later rooms of their library. Nothing in src/ may include python/. x.cc must
-include x.h first, which shows that the header is self-contained.
+A file may include headers of its own room and of the rooms above it in those tables; thus the first library does not depend on
+the second. Tests, benchmarks and folders testing/ may include headers of later rooms of their library. Nothing in src/ may
+include python/. x.cc must include x.h first, which shows that the header is self-contained.
 
-The namespace of a room is mjsense::ROOM or mjsense::tasks::ROOM, that of core/ is mjsense and that of tasks/ is mjsense::tasks. Folders
-testing/ may use mjsense::testing. In other namespaces of the libraries, a file may only declare types and specialise templates.
+The namespace of a room is mjsense::ROOM or mjsense::tasks::ROOM, that of core/ is mjsense and that of tasks/ is mjsense::tasks.
+Folders testing/ may use mjsense::testing. In other namespaces of the libraries, a file may only declare types and specialise
+templates.
 
-A Python module may import modules of its own room and of the rooms above it, and no module imports itself through others. Imports inside
-functions and those for type checkers (TYPE_CHECKING) count. Texts may not name a module of a later room, as import_module() takes them.
+A Python module may import modules of its own room and of the rooms above it, and no module imports itself through others. Imports
+inside functions and those for type checkers (TYPE_CHECKING) count. Texts may not name a module of a later room, as
+import_module() takes them.
 """
 
 from __future__ import annotations
@@ -37,7 +40,8 @@ JUDGES = re.compile(r"_(test|bench)\.cc$|/testing/")
 
 
 def rooms_of(page: str) -> list[str]:
-    """The first columns of the tables in the section "## Rooms", in order, after the folder in the heading of each table: mjsense/core."""
+    """The first columns of the tables in the section "## Rooms", in order, after the folder in the heading of each table:
+    mjsense/core."""
     section = page.split("## Rooms", 1)[1].split("\n## ", 1)[0]
     rooms = []
     for part in section.split("\n### ")[1:]:
@@ -74,7 +78,8 @@ def wrong_includes(path: Path, text: str, order: dict[str, int]) -> list[str]:
 
 
 def namespace_of(room: str) -> str:
-    """mjsense/core: mjsense; mjsense/rays: mjsense::rays; mjsense_tasks/tasks: mjsense::tasks; mjsense_tasks/robots: mjsense::tasks::robots."""
+    """mjsense/core: mjsense; mjsense/rays: mjsense::rays; mjsense_tasks/tasks: mjsense::tasks; mjsense_tasks/robots:
+    mjsense::tasks::robots."""
     names = room.replace("mjsense_tasks", "mjsense::tasks").split("/")
     return names[0] if room in ("mjsense/core", "mjsense_tasks/tasks") else "::".join(names)
 
@@ -131,8 +136,8 @@ def files_of(root: Path) -> dict[str, Path]:
 
 
 def import_graph(root: Path) -> dict[str, set[str]]:
-    """Module -> modules of the package in the folder `root` that it imports. A package imported with a module counts unless it contains the
-    importing module: it is then being loaded already."""
+    """Module -> modules of the package in the folder `root` that it imports. A package imported with a module counts unless it
+    contains the importing module: it is then being loaded already."""
     files = files_of(root)
     compiled = f"{root.name}._core"  # imports nothing from the package when it is loaded
     graph: dict[str, set[str]] = {}

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the compile commands of single files, also of those that CMake compiles in groups (cmake/UnityBuild.cmake), for tools that
-examine one file.
+"""Writes the compile commands of single files, also of those that CMake compiles in groups (cmake/UnityBuild.cmake), for tools
+that examine one file.
 
 usage: tools/compile_database.py BUILD     writes BUILD/files/compile_commands.json
 """

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compares simulations with ``backend="warp"`` with those on the CPU, measures their speed, and writes the tables of docs/warp_comparison.md.
+"""Compares simulations with ``backend="warp"`` with those on the CPU, measures their speed, and writes the tables of
+docs/warp_comparison.md.
 
     python tools/gpu_check.py [--device cuda:0] [--worlds 64] [--steps 10] [--long 1000] [--minutes 9] [--write]
 
 First both sides have the same physics, that of the CPU, so that only the arithmetic of the sensors differs: contacts, forces and
-derived quantities are copied before the sensors are computed. Then both engines step from the same states with the same controls; their
-states are made equal after each step. Forces and accelerations are compared there in worlds in which mujoco_warp finds the same contacts
-as MuJoCo; the others are counted.
+derived quantities are copied before the sensors are computed. Then both engines step from the same states with the same controls;
+their states are made equal after each step. Forces and accelerations are compared there in worlds in which mujoco_warp finds the
+same contacts as MuJoCo; the others are counted.
 
-Every part runs in a process of its own if an earlier one has failed, because an error of CUDA makes its process useless. A part that fails,
-or for which no time is left, is reported, and the next one runs. The exit code is 1 if there is such a part, or if a field differs by
-more than its bound.
+Every part runs in a process of its own if an earlier one has failed, because an error of CUDA makes its process useless. A part
+that fails, or for which no time is left, is reported, and the next one runs. The exit code is 1 if there is such a part, or if a
+field differs by more than its bound.
 """
 
 from __future__ import annotations
@@ -276,7 +277,8 @@ def main() -> int:
     lines = report(
         results,
         failed,
-        f"Device `{device}` ({name}), {versions}: {arguments.worlds} worlds, {arguments.steps} control steps in each of {scenes} scenes.",
+        f"Device `{device}` ({name}), {versions}: {arguments.worlds} worlds, {arguments.steps} control steps in "
+        f"each of {scenes} scenes.",
     )
     print("\n".join(lines))
     if arguments.write:

@@ -3,7 +3,8 @@
 """Checks C++ files with clang's front end, using the compile commands of a GCC build. Finds errors and warnings that GCC does not
 report.
 
-usage: tools/other_compiler.py BUILD [FILE ...]     without files: all of src/, in the groups of cmake/UnityBuild.cmake if BUILD has them
+usage: tools/other_compiler.py BUILD [FILE ...]     without files: all of src/, in the groups of cmake/UnityBuild.cmake if BUILD
+    has them
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes docs/pictures/path.jpg: a state of a recording with classic, pbr and path shading. python tools/path_pictures.py [SAMPLES]
+"""Writes docs/pictures/path.jpg: a state of a recording with classic, pbr and path shading. python tools/path_pictures.py
+[SAMPLES]
 
 SAMPLES: paths per pixel, 256 by default. Needs ffmpeg.
 """

@@ -3,8 +3,8 @@
 
     python tools/replay_table.py [--episodes 2] [--only TASK[/ROBOT]]
 
-Each pair is recorded in the task's own scene with small images and depth. Results are stored in .cache/replay, so that a part can be
-repeated alone.
+Each pair is recorded in the task's own scene with small images and depth. Results are stored in .cache/replay, so that a part can
+be repeated alone.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes docs/pictures/scene_sheet.jpg, built-in scenes above those of robosuite and LIBERO: python tools/scene_sheet.py.
 
-Two rows of scenes of mjsense, one of robosuite and one of LIBERO. Theirs are drawn by robosuite's own renderer, at the start of an
-episode. Needs ffmpeg, OpenGL, and a Python with mjsense, robosuite 1.4 (for LIBERO's environments) and LIBERO.
+Two rows of scenes of mjsense, one of robosuite and one of LIBERO. Theirs are drawn by robosuite's own renderer, at the start of
+an episode. Needs ffmpeg, OpenGL, and a Python with mjsense, robosuite 1.4 (for LIBERO's environments) and LIBERO.
 """
 
 from __future__ import annotations

@@ -151,7 +151,8 @@ def fields() -> Fields:
 
 
 class CopiedPhysics:
-    """Takes the place of mujoco_warp's steps: state, derived quantities, contacts and forces are those of the worlds on the CPU."""
+    """Takes the place of mujoco_warp's steps: state, derived quantities, contacts and forces are those of the worlds on the
+    CPU."""
 
     def __init__(self, reference: Any) -> None:
         self._reference = reference
@@ -260,8 +261,8 @@ def same_contacts(reference: Any, ours: Any) -> np.ndarray:
 
 
 def contact_algorithm(model: Any) -> str:
-    """Names the geoms between which mujoco_warp finds contacts in another way than MuJoCo; contact sensors are then compared in the
-    worlds with the same contacts."""
+    """Names the geoms between which mujoco_warp finds contacts in another way than MuJoCo; contact sensors are then compared in
+    the worlds with the same contacts."""
     if model.nhfield:
         return ", height field"
     collides = (model.geom_contype | model.geom_conaffinity) > 0
@@ -312,8 +313,9 @@ def compare(found: Fields, reference: Any, ours: Any, past: list[np.ndarray], pl
 
 
 def tied_contacts(reference: Any) -> np.ndarray:
-    """The worlds in which two contacts have forces that are equal within rounding to float32, bool ``[B]``: it is arbitrary which of
-    them a sensor reports first. Height fields have such contacts, where two triangles meet. Contacts that are equal do not count."""
+    """The worlds in which two contacts have forces that are equal within rounding to float32, bool ``[B]``: it is arbitrary which
+    of them a sensor reports first. Height fields have such contacts, where two triangles meet. Contacts that are equal do not
+    count."""
     tied = np.zeros(reference.num_worlds, bool)
     for world, data in enumerate(reference.env.mj_datas):
         forces = np.zeros((data.ncon, 6))
@@ -330,15 +332,16 @@ def tied_contacts(reference: Any) -> np.ndarray:
 def torque_rounding(pos: np.ndarray, force: np.ndarray) -> float:
     """Largest error of a net torque due to the rounding of positions to float32, N m.
 
-    A position ``p`` is rounded by up to ``u |p|``, ``u`` = 2^-24. An arm is the difference of two positions, and so is the lever of the
-    net force, a weighted mean of arms: each is wrong by up to ``2 u |p|``, and the net torque by ``4 u |p|`` times the sum of the forces.
-    The contacts of one object push in similar directions, so that the net force stands for that sum.
+    A position ``p`` is rounded by up to ``u |p|``, ``u`` = 2^-24. An arm is the difference of two positions, and so is the lever
+    of the net force, a weighted mean of arms: each is wrong by up to ``2 u |p|``, and the net torque by ``4 u |p|`` times the sum
+    of the forces. The contacts of one object push in similar directions, so that the net force stands for that sum.
     """
     return 4 * 2.0**-24 * float((np.linalg.norm(pos, axis=-1) * np.linalg.norm(force, axis=-1)).max())
 
 
 def add_physics(found: Fields, reference: Any, ours: Any, same: np.ndarray, algorithm: str, place: str) -> None:
-    """The differences of the two engines, before any sensor: in how many worlds contacts differ, and the accelerations of the others."""
+    """The differences of the two engines, before any sensor: in how many worlds contacts differ, and the accelerations of the
+    others."""
     contacts = found["(engine)", f"worlds with other contacts{algorithm}"]
     contacts.exact, contacts.values, contacts.other = True, contacts.values + len(same), contacts.other + int((~same).sum())
     entry = found["(engine)", "qacc"]
@@ -382,7 +385,8 @@ def run_copied(device: str, worlds: int, count: int, scenes: dict[str, SceneOfCh
 
 
 def beyond(found: Fields) -> list[str]:
-    """Fields of sensors that differ by more than their bound, or, if they are compared for equality, in more than 1 % of the values."""
+    """Fields of sensors that differ by more than their bound, or, if they are compared for equality, in more than 1 % of the
+    values."""
     wrong = []
     for (kind, name), entry in found.items():
         if kind[0] == "(":

@@ -31,11 +31,13 @@ ROBOT = """
       <body name="right_wheel" pos="0 -.2 -.1"><joint name="right" axis="0 1 0"/>
         <geom name="right_wheel" type="sphere" size=".1" mass=".3"/></body>
       <body name="arm" pos=".2 0 .1"><joint name="arm" axis="0 1 0" damping=".2" range="-40 80" limited="true"/>
-        <geom name="arm" type="capsule" fromto="0 0 0 .3 0 0" size=".03" mass=".4"/><site name="hand" pos=".3 0 0" size=".04"/></body>
+        <geom name="arm" type="capsule" fromto="0 0 0 .3 0 0" size=".03" mass=".4"/><site name="hand" pos=".3 0 0"
+        size=".04"/></body>
     </body>
   </worldbody>
   <tendon><fixed name="difference"><joint joint="left" coef="1"/><joint joint="right" coef="-1"/></fixed></tendon>
-  <actuator><motor name="left" joint="left"/><motor name="right" joint="right"/><motor name="arm" joint="arm" gear="3"/></actuator>
+  <actuator><motor name="left" joint="left"/><motor name="right" joint="right"/><motor name="arm" joint="arm"
+  gear="3"/></actuator>
   <sensor>
     <touch name="touch" site="hand"/><accelerometer name="accelerometer" site="imu"/><velocimeter name="velocimeter" site="imu"/>
     <gyro name="gyro" site="imu"/><force name="force" site="hand"/><torque name="torque" site="hand"/>
@@ -208,8 +210,8 @@ def sensors_of(site: str, things: tuple[str, ...], camera: str = "") -> tuple[An
 
 
 class OfTask(SceneOfCheck):
-    """The scene of a task with its robot; the worlds start where its first episodes do, and the model where the first does, because
-    all objects of a task are in one place in its own model."""
+    """The scene of a task with its robot; the worlds start where its first episodes do, and the model where the first does,
+    because all objects of a task are in one place in its own model."""
 
     def __init__(self, task: str, robot: str, scene: str = "") -> None:
         super().__init__(self._cfg, decimation=4)

@@ -3,7 +3,8 @@
 
     python lerobot_writer.py DATA_SET OUT png|av1|h264 STEPS
 
-The frames of a data set are written again, at a whole number of frames per second, because 0.4.4 cannot write others. png: PNG files, then AV1, LeRobot's default; av1, h264: encoded while recording.
+The frames of a data set are written again, at a whole number of frames per second, because 0.4.4 cannot write others. png: PNG
+files, then AV1, LeRobot's default; av1, h264: encoded while recording.
 """
 
 import resource

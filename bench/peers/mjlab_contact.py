@@ -5,7 +5,8 @@ The scene is mjlab's own: Scene and Simulation on the device "cpu", its Go1 held
 physics (mujoco_warp, whose kernels are compiled in the first run, which takes about a minute). The last line of the output is a
 JSON object with CPU microseconds of one thread per world and substep:
 
-    physics           Simulation.step in the scene without the feet's sensors; includes the IMU's sensordata, as in bench/contact.py
+    physics           Simulation.step in the scene without the feet's sensors; includes the IMU's sensordata, as in
+                      bench/contact.py
     sensors           increase of Simulation.step with the feet's sensors, because mujoco_warp fills their sensordata
     torch             update of all sensors at every substep, and reading feet and IMU at every fourth
     feet_in_contact   share of the feet in contact at the end, to check that the robots stand

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The task of train.py: a quadruped follows a commanded velocity over rough ground, and feels it with its feet and a height scan."""
+"""The task of train.py: a quadruped follows a commanded velocity over rough ground, and feels it with its feet and a height
+scan."""
 
 import gymnasium
 import mujoco
@@ -19,11 +20,13 @@ class Walk(mjs.Task):
     robot_entity = "robot"
 
     def __init__(self, model="embedded:robots/quadruped.xml", rough=True):
-        """`model`: of a quadruped with a Unitree Go1's names; servos are added where it has none. `rough`: waves and bumps, else a plane."""
+        """`model`: of a quadruped with a Unitree Go1's names; servos are added where it has none. `rough`: waves and bumps, else
+        a plane."""
         self.model, self.rough = model, rough
 
     def with_servos(self):
-        """Unitree's Go1 comes without motors, and without what they do to its joints: legs without inertia of a rotor tremble at every command."""
+        """Unitree's Go1 comes without motors, and without what they do to its joints: legs without inertia of a rotor tremble at
+        every command."""
         spec = mujoco.MjSpec.from_file(str(self.model))
         for joint in [j for j in spec.joints if j.type == mujoco.mjtJoint.mjJNT_HINGE]:
             joint.armature, joint.damping[0], joint.frictionloss = 0.01, 0.5, 0.2

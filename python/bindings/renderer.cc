@@ -14,6 +14,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/render/abstract/scene_renderer.h"
+#include "mjsense/render/light/environment_image.h"
 #include "mjsense/sensors/camera/physical_options.h"
 #include "python/bindings/bindings.h"
 
@@ -164,9 +165,18 @@ struct BoundRenderer {
   }
 };
 
+// render::ExrReader.
+std::string radiance_of_exr(const std::string& path, const std::string& bytes) {
+  const nb::gil_scoped_acquire gil;
+  const nb::object read = nb::module_::import_("mjsense.rendering.exr").attr("radiance_file");
+  const auto made = nb::cast<nb::bytes>(read(path, nb::bytes(bytes.data(), bytes.size())));
+  return {made.c_str(), made.size()};
+}
+
 }  // namespace
 
 void bind_renderer(nb::module_& m) {
+  render::set_exr_reader(&radiance_of_exr);
   m.def("scene_index_fields", &render::scene_index_fields,
         "Arrays of integers of an mjModel that MuJoCo reads when it updates a scene.");
   nb::class_<BoundRenderer>(m, "SceneRenderer")

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import mjsense as mjs
+from mjsense.core.optional import optional
 from mjsense.core.png import png_of
 from mjsense.core.rotations import quaternions_of
 from mjsense.dataset.model_xml import model_xml
@@ -355,3 +356,12 @@ def test_a_missing_library_is_an_error_with_the_extra(name, root, tmp_path, monk
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(ModuleNotFoundError, match=rf"pip install 'mjsense\[{FORMATS[name].extra}\]'"):
         mjs.export(root, tmp_path / "out", format=name)
+
+
+def test_a_package_that_cannot_be_imported_is_an_error_that_names_it(tmp_path, monkeypatch):
+    (tmp_path / "zarr").mkdir()
+    (tmp_path / "zarr/__init__.py").write_text("from json import cbuffer_sizes")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "zarr", raising=False)
+    with pytest.raises(ImportError, match=r"This export needs zarr, which is installed but cannot be imported: .*cbuffer_sizes.*pip install 'mjsense\[zarr\]'"):
+        optional("zarr", "zarr", "This export")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Damaged footers of an index, with which pyarrow ends the process."""
+"""Footers of Parquet files; pyarrow ends the process when it reads some damaged ones."""
 
 import contextlib
 
@@ -9,29 +9,43 @@ import pytest
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")
 
-from mjsense.dataset import index, parquet_footer
+from mjsense.dataset import import_lerobot, index, parquet_footer
 
-ROW = {"episode": [0], "path": ["a.h5"], "trajectory": ["traj_0"], "seed": [1], "length": [2], "success": [True], "outcome": ["success"], "task": ["pick"]}
+ROW = {"episode": [0], "path": ["house_0/trajectories_batch_1_of_1.h5"], "trajectory": ["traj_0"], "seed": [1], "length": [2], "success": [True], "outcome": ["success"], "task": ["pick"]}
+
+
+def lerobot_reader(path):
+    """Reads a table as the import of LeRobot data sets does."""
+    source = object.__new__(import_lerobot._Source)
+    source.root, source._tables = path.parent, pq
+    return lambda path: source._table(path, source._names(path))
 
 
 @pytest.mark.parametrize("codec", ("NONE", "SNAPPY", "GZIP", "BROTLI", "ZSTD", "LZ4"))
-def test_codecs_are_those_of_pyarrow(tmp_path, codec):
+def test_the_footer_says_what_pyarrow_says(tmp_path, codec):
     path = tmp_path / "index.parquet"
-    pq.write_table(pa.table(ROW), path, compression=codec)
+    pq.write_table(pa.table({**{key: value * 5 for key, value in ROW.items()}, "list": [[1, 2]] * 5}), path, compression=codec, row_group_size=2)
+    about = pq.read_metadata(path)
+    groups = [about.row_group(i) for i in range(about.num_row_groups)]
+    columns = [group.column(i) for group in groups for i in range(group.num_columns)]
     with open(path, "rb") as file:
-        assert parquet_footer.codecs(path, file) == {pq.read_metadata(path).row_group(0).column(0).compression.replace("LZ4", "LZ4_RAW")}
+        footer = parquet_footer.read(path, file)
+    assert (footer.rows, footer.values) == (5, sum(column.num_values for column in columns)) and len(groups) == 3
+    assert footer.bytes == sum(group.total_byte_size for group in groups)
+    assert footer.codecs == {column.compression.replace("LZ4", "LZ4_RAW") for column in columns}
 
 
-def test_a_damaged_footer_does_not_end_the_process(tmp_path):
+@pytest.mark.parametrize("reader", (lambda path: index.rows_of, lerobot_reader), ids=("index", "lerobot"))
+def test_a_damaged_footer_does_not_end_the_process(tmp_path, reader):
     path, rng, refused = tmp_path / "index.parquet", np.random.default_rng(0), 0
     pq.write_table(pa.table(ROW), path)
-    content = path.read_bytes()
+    content, read = path.read_bytes(), reader(path)
     for _ in range(600):
         changed = bytearray(content)
         changed[rng.integers(len(content) // 2, len(content))] = rng.integers(256)
         path.write_bytes(changed)
         refused += 1
         with contextlib.suppress(ValueError):
-            index.rows_of(path)
+            read(path)
             refused -= 1
     assert 0 < refused < 600

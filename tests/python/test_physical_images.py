@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Images with shading="pbr": the same bits for any number of threads and worlds, other outputs as with classic shading, bad options."""
 
+import sys
 from pathlib import Path
 
 import mujoco
@@ -122,12 +123,19 @@ def test_hdr_is_the_radiance_of_the_image() -> None:
     [
         ({"shading": "pbrr"}, "shading is 'pbrr': must be one of classic, pbr"),
         ({"exposure": 99}, "exposure"),
+        ({"exposure_mode": "auto"}, "exposure_mode 'auto' and imager need linear radiance, thus shading 'pbr' or 'path'; it is 'classic'"),
+        ({"shading": "pbr", "imager": "d436"}, "imager is 'd436': must be one of none, d435, zed_mini"),
+        (
+            {"shading": "pbr", "imager": "d435", "imager_values": mjs.sensors.ImagerCfg()},
+            "imager is 'd435' and imager_values are given",
+        ),
         ({"environment_intensity": -1}, "environment_intensity"),
         ({"tone_mapping": "aces"}, "must be one of neutral, filmic, linear, agx"),
         ({"white_balance": 1000}, "white_balance"),
         ({"shading": "pbr", "environment": "studo"}, "environment: no surroundings named 'studo'; did you mean 'studio'"),
         ({"shading": "pbr", "environment": "skybox"}, "the model has no skybox texture"),
-        ({"shading": "pbr", "environment": "x.exr"}, "only Radiance pictures"),
+        ({"shading": "pbr", "environment": "x.exr"}, "environment 'x.exr': no such file"),
+        ({"shading": "pbr", "environment": "x.jpg"}, "only pictures of type .hdr and .exr"),
         ({"shading": "pbr", "environment": "none.hdr"}, "environment 'none.hdr': no such file"),
         ({"shading": "pbr", "renderer": "opengl"}, "classic shading only"),
     ],
@@ -155,3 +163,153 @@ def test_renderer_has_the_shading_of_cameras() -> None:
             renderer.shading = "ray"
         renderer.shading = "classic"
         np.testing.assert_array_equal(renderer.render(), classic)
+
+
+LAMP = """
+<mujoco>
+  <visual><headlight active="0"/></visual>
+  <asset><texture name="around" type="cube" builtin="flat" rgb1="1 1 1" rgb2="1 1 1" width="8" height="8"/></asset>
+  <worldbody>
+    <light name="around" type="image" texture="around" intensity="314.16" diffuse="1 .5 .25"/>
+    <light name="lamp" type="directional" dir="0 0 -1" diffuse="1 1 1" intensity="314.16" castshadow="false"/>
+    <geom type="plane" size="3 3 .1" rgba="1 1 1 1"/>
+    <body name="ball" pos="5 0 1"><freejoint/><geom size=".1"/></body>
+    <camera name="view" pos="0 0 1"/>
+  </worldbody>
+</mujoco>
+"""
+"""A white floor, lit by the surroundings with 314 lux and by a lamp with as much: 100 cd/m^2 each in red."""
+
+
+class Lamp:
+    """The floor in worlds whose lamps can be changed."""
+
+    def __init__(self, worlds: int = 1, threads: int = 1, **options: object) -> None:
+        camera = mjs.CameraSensorCfg(name="cam", camera_name="w/view", width=32, height=24, shading="pbr", ambient_occlusion=False, **options)
+        self.scene = mjs.Scene(mjs.SceneCfg(entities={"w": mjs.EntityCfg(model=LAMP)}, sensors=[camera]))
+        self.sim = mjs.Simulation(self.scene, num_worlds=worlds, threads=threads)
+        self.lights = np.tile(np.array(self.sim.model.light_diffuse, np.float32), (worlds, 1, 1))
+
+    def shine(self, light: int, world: int, color: tuple[float, float, float]) -> None:
+        self.lights[world, light] = color
+        self.sim.randomize("light_diffuse", self.lights)
+
+    def seen(self, kind: str = "rgb") -> np.ndarray:
+        return np.array(getattr(self.scene["cam"].data, kind), float)
+
+
+def test_image_lights_have_a_colour_and_intensity_in_each_world() -> None:
+    """The illuminance of the surroundings is their intensity; as with other lights, the colour is diffuse."""
+    lamp = Lamp(2, data_types=("hdr",), environment_rotation=20)
+    for world in (0, 1):
+        lamp.shine(1, world, (0, 0, 0))
+    lamp.shine(0, 1, (0.5, 0.5, 0.5))
+    lamp.sim.forward()
+    radiance = lamp.seen("hdr").mean((1, 2))
+    np.testing.assert_allclose(radiance[0], (100, 50, 25), rtol=0.03)  # white reflects a little as a mirror
+    np.testing.assert_allclose(radiance[1], (50, 50, 50), rtol=0.03)
+    model = mujoco.MjModel.from_xml_string(LAMP)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    with mjs.Renderer(model, 24, 32) as renderer:
+        renderer.shading = "pbr"
+        renderer.update_scene(data, "view")
+        warm = renderer.render().mean((0, 1))
+    assert warm[0] > warm[1] + 5 > warm[2] + 10
+
+
+def test_automatic_exposure_follows_the_light() -> None:
+    """The first image is exposed for middle grey; after a change, 63 % of it follow in one time constant; a reset meters anew."""
+    lamp = Lamp(2, exposure_mode="auto", exposure_time_constant=0.1, tone_mapping="linear")
+    lamp.shine(0, 0, (1, 1, 1))
+    lamp.shine(0, 1, (1, 1, 1))
+
+    def grey() -> np.ndarray:  # linear, of 1 for white
+        x = lamp.seen().mean((1, 2, 3)) / 255
+        return ((x + 0.055) / 1.055) ** 2.4
+
+    lamp.sim.forward()
+    np.testing.assert_allclose(grey(), 0.18, rtol=0.03)
+    lamp.shine(0, 1, (0.1, 0.1, 0.1))  # from 200 to 110 cd/m^2
+    steps = round(0.1 / lamp.sim.model.opt.timestep)
+    for _ in range(steps):
+        lamp.sim.step()
+    seen = grey()
+    np.testing.assert_allclose(seen[0], 0.18, rtol=0.03)
+    np.testing.assert_allclose(seen[1], 0.18 * (110 / 200) ** np.exp(-1), rtol=0.04)
+    np.testing.assert_array_equal(grey(), seen)  # a second read gives the same image
+    lamp.sim.reset([1])
+    np.testing.assert_allclose(grey(), 0.18, rtol=0.03)
+
+
+def test_noise_of_image_sensors() -> None:
+    """The variance is that of photons and reading, and grows with the gain; the corners are darker; worlds and threads do not matter."""
+    values = mjs.sensors.ImagerCfg(full_well=2000, read_noise=10, bits=16, f_number=2, exposure_time=1 / 64, vignetting=0)
+
+    def linear(lamp: Lamp) -> np.ndarray:
+        lamp.sim.forward()
+        x = lamp.seen() / 255
+        return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)
+
+    with pytest.raises(ValueError, match="bits is 0: must be between 1 and 16"):
+        mjs.sensors.ImagerCfg(bits=0)
+    plain = {"tone_mapping": "linear", "environment_intensity": 0.0}
+    for exposure, gain, light in ((8, 1, 1.0), (6, 4, 0.25)):  # with f/2 and 1/64 s, EV 8 needs no gain
+        shown = []
+        for imager in (values, None):
+            lamp = Lamp(1, exposure=exposure, imager_values=imager, **plain)
+            lamp.shine(1, 0, (light, light, light))
+            shown.append(linear(lamp))
+        noise, mean, well = shown[0] - shown[1], shown[1].mean(), 2000 / gain
+        assert 0.2 < mean < 0.5
+        variance = (mean * well + 100) / well**2
+        assert abs(noise.mean()) < 5 * np.sqrt(variance / noise.size)
+        np.testing.assert_allclose(noise.std(), np.sqrt(variance), rtol=0.08)
+    corners = linear(Lamp(1, imager_values=mjs.sensors.ImagerCfg(full_well=1e12, read_noise=0, bits=16, vignetting=1), **plain))[0, :, :, 0]
+    whole = linear(Lamp(1, **plain))[0, :, :, 0]
+    x, y = (np.arange(32) - 15.5) / 12 * np.tan(np.pi / 8), (np.arange(24) - 11.5) / 12 * np.tan(np.pi / 8)
+    np.testing.assert_allclose(corners / whole, 1 / (1 + x[None] ** 2 + y[:, None] ** 2) ** 2, atol=0.02)
+    reference = images(4, 1, shading="pbr", imager="d435", exposure_mode="auto")["rgb"]
+    for threads in (2, 5):
+        np.testing.assert_array_equal(images(4, threads, shading="pbr", imager="d435", exposure_mode="auto")["rgb"], reference)
+    np.testing.assert_array_equal(images(1, 1, shading="pbr", imager="d435", exposure_mode="auto")["rgb"][0], reference[0])
+    assert np.mean(images(1, 1, shading="pbr", imager="zed_mini")["rgb"] != images(1, 1, shading="pbr")["rgb"]) > 0.3
+
+
+def test_surroundings_of_openexr_pictures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are those of the same .hdr picture; without the package, and for bad files, there is one error."""
+    rgb = np.full((8, 16, 3), 0.25, np.float32)
+    rgb[:, :8] = (2, 0.5, 0)
+    path = tmp_path / "sky.exr"
+
+    def seen() -> np.ndarray:
+        return images(1, 1, 1, ("rgb",), shading="pbr", environment=str(path))["rgb"]
+
+    path.write_bytes(b"no picture")
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, "OpenEXR", None)
+        with pytest.raises(ModuleNotFoundError, match=r"environment '.*sky.exr' needs OpenEXR: pip install 'mjsense\[exr\]'"):
+            seen()
+    openexr = pytest.importorskip("OpenEXR")
+
+    def write(name: str, pixels: np.ndarray) -> None:
+        openexr.File({"compression": openexr.ZIP_COMPRESSION, "type": openexr.scanlineimage}, {name: pixels}).write(str(path))
+
+    for name, pixels, message in (
+        ("", rgb, "not an OpenEXR picture, or damaged"),
+        ("RGB", rgb[:, :9], "9 x 8 pixels; an equirectangular image is twice as wide as high"),
+        ("Y", rgb[..., 0].copy(), "no channel R; there are Y"),
+        ("RGB", np.where(rgb == 2, np.nan, rgb), "radiance nan in column 0, row 0"),
+        ("RGB", -rgb, "radiance -2 in column 0, row 0"),
+    ):
+        if name:
+            write(name, np.ascontiguousarray(pixels))
+        with pytest.raises(ValueError, match=f"environment '.*sky.exr': {message}"):
+            seen()
+    write("RGB", rgb)
+    from_exr = seen()
+    texel = {(2, 0.5, 0): (128, 32, 0, 130), (0.25, 0.25, 0.25): (128, 128, 128, 127)}
+    rgbe = np.array([[texel[tuple(x)] for x in row] for row in rgb.tolist()], np.uint8)
+    path = tmp_path / "sky.hdr"
+    path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n" + rgbe.tobytes())
+    np.testing.assert_array_equal(seen(), from_exr)

@@ -26,7 +26,8 @@ class MjsenseEnvConfig(EnvConfig):
     """A task of mjsense. None and empty texts stand for mjsense's defaults."""
 
     task: str | None = "pick"
-    """Name of the task, or a benchmark, which fixes all other options but ``map``: its folder, or ``benchmark:pick`` and similar."""
+    """Name of the task, or a benchmark, which fixes all other options but ``map``: its folder, or ``benchmark:pick`` and
+    similar."""
     robot: str = ""
     scene: str = ""
     split: str = ""

@@ -20,9 +20,9 @@ PIXELS, AGENT_POS = "pixels", "agent_pos"
 class LeRobotVectorEnv(VectorEnv):
     """Worlds of a task that run in lock step.
 
-    LeRobot's seed of an episode is the number of the episode, as in ``mjsense evaluate``: with ``lerobot-eval --seed=0`` the episodes are 0, 1,
-    and so on. With ``episodes``, the seed ``s`` stands for ``episodes[s % len(episodes)]``: as many successive seeds as there are numbers play
-    each of them once. A world whose episode has ended stands still until the next reset.
+    LeRobot's seed of an episode is the number of the episode, as in ``mjsense evaluate``: with ``lerobot-eval --seed=0`` the
+    episodes are 0, 1, and so on. With ``episodes``, the seed ``s`` stands for ``episodes[s % len(episodes)]``: as many successive
+    seeds as there are numbers play each of them once. A world whose episode has ended stands still until the next reset.
 
     Args:
         options: Arguments of :func:`mjsense.make_vec`.
@@ -129,7 +129,8 @@ class LeRobotVectorEnv(VectorEnv):
 
 
 class LeRobotEnv(gymnasium.Env):
-    """One world, for versions of LeRobot that make vector environments of single ones. The arguments are those of :class:`LeRobotVectorEnv`."""
+    """One world, for versions of LeRobot that make vector environments of single ones. The arguments are those of
+    :class:`LeRobotVectorEnv`."""
 
     def __init__(self, options: dict[str, Any], episodes: Sequence[int] | None = None, map: str | None = None) -> None:
         self._env = LeRobotVectorEnv(options, 1, episodes, map)

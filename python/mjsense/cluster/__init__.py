@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recording on many machines with Ray: a job is divided into shards, ranges of attempts, each of which any worker can record alone."""
+"""Recording on many machines with Ray: a job is divided into shards, ranges of attempts, each of which any worker can record
+alone."""
 
 from mjsense.cluster.driver import ClusterProgress, ClusterSummary, record_on_ray
 from mjsense.cluster.exporting import export_on_ray

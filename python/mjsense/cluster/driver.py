@@ -130,7 +130,8 @@ def record_on_ray(
         episodes: Number of episodes to keep: the first ones.
         max_attempts: Maximum number of attempts; 0: six times ``episodes``.
         shard_attempts: Attempts of one task.
-        address: ``local`` for a cluster of this machine's CPUs that ends with the recording, ``auto``, or the address of a cluster.
+        address: ``local`` for a cluster of this machine's CPUs that ends with the recording, ``auto``, or the address of a
+            cluster.
         resume: Continue an interrupted recording.
         runtime_env: Ray's runtime environment: ``working_dir``, ``pip`` and so on.
         progress: Called about once per second.

@@ -41,9 +41,9 @@ def export_on_ray(
 ) -> Path:
     """Writes a recording in the format of another program, on Ray. The result is that of :func:`mjsense.export`.
 
-    Workers decode and write parts with some episodes each in the folder ``OUT.parts``, and the driver joins them without encoding the data
-    again. The driver writes formats without ``join``, which are LeRobot's, alone and without a cluster: it copies their videos, and encodes those
-    of episodes from which idle steps are left out.
+    Workers decode and write parts with some episodes each in the folder ``OUT.parts``, and the driver joins them without encoding
+    the data again. The driver writes formats without ``join``, which are LeRobot's, alone and without a cluster: it copies their
+    videos, and encodes those of episodes from which idle steps are left out.
 
     Args:
         root: A recording that all workers see: a path, an index, or an address.

@@ -65,7 +65,8 @@ class ShardResult:
     fingerprint: str
     """Of the job; results of another job are refused."""
     episodes: list[dict[str, Any]]
-    """One dict for each kept episode: episode (its attempt), path (relative to the shard), trajectory, seed, length, success, outcome, task."""
+    """One dict for each kept episode: episode (its attempt), path (relative to the shard), trajectory, seed, length, success,
+    outcome, task."""
     succeeded: int
     failed: int
     steps: int

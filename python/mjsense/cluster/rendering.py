@@ -75,7 +75,8 @@ def render_on_ray(
     progress: Callable[[ClusterProgress], None] | None = None,
     **options: Any,
 ) -> ClusterSummary:
-    """Renders recorded episodes as :func:`mjsense.render` does, on Ray. The result has shards and an index, as a recording on Ray.
+    """Renders recorded episodes as :func:`mjsense.render` does, on Ray. The result has shards and an index, as a recording on
+    Ray.
 
     Args:
         root: A recording that all workers see: a path, an index, or an address.

@@ -40,11 +40,12 @@ def cluster(address: str, runtime_env: dict[str, Any] | None = None) -> Iterator
 
 
 class Tasks:
-    """Calls of one function as tasks of one CPU each, at most one more than the cluster has CPUs, so that no worker waits for the driver.
+    """Calls of one function as tasks of one CPU each, at most one more than the cluster has CPUs, so that no worker waits for the
+    driver.
 
-    A task that is lost with its worker or machine is repeated; an exception of the function is raised here. A task whose process has died
-    twice is repeated in a process of its own (``alone``), which tells how it ended. If that is a defect, such as SIGSEGV, twice, this is
-    an error.
+    A task that is lost with its worker or machine is repeated; an exception of the function is raised here. A task whose process
+    has died twice is repeated in a process of its own (``alone``), which tells how it ended. If that is a defect, such as
+    SIGSEGV, twice, this is an error.
     """
 
     def __init__(
@@ -71,7 +72,8 @@ class Tasks:
             yield from ended
 
     def wait(self) -> list[tuple[tuple[Any, ...], Any]]:
-        """Arguments and results of the tasks that have ended, after at most a second. Ended tasks are replaced by new ones first."""
+        """Arguments and results of the tasks that have ended, after at most a second. Ended tasks are replaced by new ones
+        first."""
         self._start_new()
         done = self._ray.wait(list(self._running), timeout=1.0)[0] if self._running else []
         found = [
@@ -106,7 +108,8 @@ class Tasks:
             if isinstance(error.cause, self._ray.exceptions.RaySystemError):
                 reason = str(error.cause).splitlines()[0].removeprefix("System error: ")
                 raise RuntimeError(
-                    f"The workers cannot load the arguments of the task {self._function.__name__}: {reason}. Send its folder with "
+                    f"The workers cannot load the arguments of the task {self._function.__name__}: {reason}. Send "
+                    "its folder with "
                     "working_dir (--ray-working-dir), or install its package with pip (--ray-pip)"
                 ) from None
             raise (error.cause if isinstance(error.cause, Exception) else error) from None

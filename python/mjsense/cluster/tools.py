@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mjsense inspect``, ``verify`` and ``repair``: of a folder or a file, of a recording with an index, or at an address.
 
-The C++ library checks and shows the files. This module adds what the readers in Python refuse, and the comparison of the index with the
-files of the shards.
+The C++ library checks and shows the files. This module adds what the readers in Python refuse, and the comparison of the index
+with the files of the shards.
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ def _summary_text(about: dict[str, Any] | None) -> str:
 
 
 def verify(path: str, *, decode: bool = False, ffmpeg: str = "", progress: Callable[[str], None] | None = None) -> dict[str, Any]:
-    """The result of ``mjsense verify --json``: whether a recording is complete and undamaged, with what readers refuse, and the comparison
-    of an index with its files.
+    """The result of ``mjsense verify --json``: whether a recording is complete and undamaged, with what readers refuse, and the
+    comparison of an index with its files.
 
     Args:
         path: Folder, file, index or address of a recording.
@@ -147,8 +147,9 @@ def _differences(local: Path, rows: list[dict[str, Any]]) -> list[tuple[int, str
 
 
 def repair(path: str) -> dict[str, list[str]]:
-    """Publishes the finished episodes of an interrupted recording. Of a recording with an index: makes the index agree with the shards: a shard that is damaged is no longer marked as done, so that ``record --resume`` records it
-    again, and the index is written anew from the complete shards without a gap. Nothing is deleted but marks.
+    """Publishes the finished episodes of an interrupted recording. Of a recording with an index: makes the index agree with the
+    shards: a shard that is damaged is no longer marked as done, so that ``record --resume`` records it again, and the index is
+        written anew from the complete shards without a gap. Nothing is deleted but marks.
 
     Returns:
         ``actions`` and ``failures``: sentences.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Experiment files: TOML with the options of a command, with ``_`` instead of ``-``. Options of the command line have priority."""
+"""Experiment files: TOML with the options of a command, with ``_`` instead of ``-``. Options of the command line have
+priority."""
 
 from __future__ import annotations
 
@@ -126,7 +127,8 @@ def _setter(parser: Parser, action: argparse.Action, opposite: bool = False) -> 
             if action.choices is not None and (wrong := [one for one in made if one not in action.choices]):
                 words = ", ".join(map(str, action.choices))
                 raise ValueError(
-                    f"{place}: {name} is '{wrong[0]}': must be one of {words}{suggestion(str(wrong[0]), map(str, action.choices))}"
+                    f"{place}: {name} is '{wrong[0]}': must be one of "
+                    f"{words}{suggestion(str(wrong[0]), map(str, action.choices))}"
                 )
             chosen = made if is_list else made[0]
         parser.set_defaults(**{name: chosen})

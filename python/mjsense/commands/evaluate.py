@@ -48,12 +48,13 @@ def add_arguments(parser: Parser) -> None:
     action = parser.add_argument(
         "--policy", default="planner", metavar="TEXT", help=f"The policy: {_POLICIES}, or the name of another one."
     )
-    setattr(complete(action, ("planner", "random")), "shown_default", "planner")  # noqa: B010  # argparse declares no such attribute
+    setattr(complete(action, ("planner", "random")), "shown_default", "planner")  # noqa: B010  # argparse has no such attribute
     add_policy_options(parser)
     action = parser.add_argument(
         "--adapter",
         metavar="TEXT",
-        help="Names and conventions of the messages to ws://HOST:PORT: droid, features, or a TOML file. Not needed if the server is mjsense serve.",
+        help="Names and conventions of the messages to ws://HOST:PORT: droid, features, or a TOML file. Not needed "
+        "if the server is mjsense serve.",
     )
     complete(action, ("droid", "features", "streams"))
     parser.add_argument(
@@ -72,7 +73,8 @@ def add_arguments(parser: Parser) -> None:
         "--ensemble",
         type=float,
         metavar="FLOAT",
-        help="Execute the mean of all chunks that have an action for the step, with the weights exp(-FLOAT * i), i = 0 for the oldest.",
+        help="Execute the mean of all chunks that have an action for the step, with the weights exp(-FLOAT * i), i "
+        "= 0 for the oldest.",
     )
     parser.add_argument(
         "--latency",
@@ -83,8 +85,9 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument(
         "--vary",
         metavar="NAMES",
-        help="Evaluate on the same episodes again with each of these factors, one at a time: light, camera, texture, distractors, instruction, "
-        "start, latency=SECONDS; separated by commas.",
+        help="Evaluate on the same episodes again with each of these factors, one at a time: light, camera, texture, "
+        "distractors, instruction, start, latency=SECONDS; separated by commas. light=0.5 changes half as much, "
+        "distractors=5 is the number of objects.",
     )
     parser.add_argument(
         "--no-terminate-upon-success",

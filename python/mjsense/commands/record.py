@@ -127,7 +127,8 @@ def _record(arguments: argparse.Namespace, options: dict[str, Any], *, sheet: bo
         tell(f"mjsense: {damage}")
     if made["interrupted"]:
         tell(
-            f"interrupted: the finished episodes are safe. Continue with --resume, or finish with `mjsense repair {made['path']}`."
+            "interrupted: the finished episodes are safe. Continue with --resume, or finish with `mjsense repair "
+            f"{made['path']}`."
         )
     elif not made["enough"]:
         tell(f"stopped after {made['succeeded'] + made['failed']} attempts; --max-attempts allows more")

@@ -15,7 +15,8 @@ EXAMPLES = [
         "Add a camera above the table; render the recorded ones again, too.",
     ),
     (
-        'mjsense render data hand --cameras --add-camera hand="body=robot_0/gripper/base pos=0.17,0,-0.02 lookat=0,0,0.2 fovy=70"',
+        'mjsense render data hand --cameras --add-camera hand="body=robot_0/gripper/base pos=0.17,0,-0.02 '
+        'lookat=0,0,0.2 fovy=70"',
         "Only a new camera, mounted on the gripper.",
     ),
     (

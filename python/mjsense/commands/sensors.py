@@ -26,7 +26,8 @@ def add_arguments(parser: Parser) -> None:
 
 
 def names_model(what: str, expected: str) -> bool:
-    """Whether ``what`` names a model: an MJCF file, or any name that begins with ``embedded:``; loading it reports the valid names.
+    """Whether ``what`` names a model: an MJCF file, or any name that begins with ``embedded:``; loading it reports the valid
+    names.
 
     Raises:
         ValueError: It looks like the name of a file, and there is no such file.

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ``mjsense`` program from its command line to its exit code.
 
-The package begins with ``answer_early``, before it loads the library, which takes 0.6 s: help, completion and wrong usage need none of it.
+The package begins with ``answer_early``, before it loads the library, which takes 0.6 s: help, completion and wrong usage need
+none of it.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ _prepared = False
 
 
 def is_program() -> bool:
-    """Whether this process is ``python -m mjsense``, or the command that the package installs; asked while the package is imported."""
+    """Whether this process is ``python -m mjsense``, or the command that the package installs; asked while the package is
+    imported."""
     if sys.argv[:1] == ["-m"]:  # until Python has found the module
         return sys.orig_argv[-len(sys.argv)] in ("mjsense", "-mmjsense")
     folder, name = os.path.split(os.path.abspath(sys.argv[0])) if sys.argv else ("", "")
@@ -49,7 +51,8 @@ def main(words: Sequence[str]) -> int:
     """Runs the program with the arguments of its command line. Errors are printed on stderr.
 
     Returns:
-        0: done; 1: some episodes or checks failed; 2: wrong usage or input; 130: interrupted; 141: the reader of the output has ended.
+        0: done; 1: some episodes or checks failed; 2: wrong usage or input; 130: interrupted; 141: the reader of the output has
+            ended.
     """
     code = _guarded(lambda: _answer(words))
     return code if code is not None else _guarded(lambda: _run(words)) or 0
@@ -92,8 +95,8 @@ class _Stdout(io.TextIOWrapper):
 def prepare_process() -> None:
     """Opens the standard streams that are closed, and makes Ctrl-C end the process at once until a command says otherwise.
 
-    The next file that is opened would get the descriptor of a closed stream, and messages would be written into it. Writing to a closed
-    stdout remains an error.
+    The next file that is opened would get the descriptor of a closed stream, and messages would be written into it. Writing to a
+    closed stdout remains an error.
     """
     global _prepared
     if _prepared:

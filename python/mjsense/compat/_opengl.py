@@ -1,11 +1,33 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images in OpenGL's conventions, which packages that call MuJoCo's renderer themselves expect."""
+"""Images for packages that call MuJoCo's renderer themselves: depth in OpenGL's conventions, and their shading."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+
+from mjsense.core.errors import nearest
+
+SHADINGS = ("classic", "pbr", "path")
+
+
+class Look(NamedTuple):
+    """The shading of a renderer, and the light from the surroundings."""
+
+    shading: str = "classic"
+    environment: str = "model"
+
+    def checked(self, function: str, shadings: tuple[str, ...] = SHADINGS) -> Look:
+        """Raises ValueError in the name of `function` for an unknown shading. The environment is checked with the model."""
+        if self.shading not in shadings:
+            near = nearest(self.shading, list(shadings), cutoff=0.0)
+            raise ValueError(f"{function}: unknown shading '{self.shading}'. Nearest: {', '.join(near)}")
+        return self
+
+    def give(self, renderer: Any) -> Any:
+        renderer.environment, renderer.shading = self.environment, self.shading
+        return renderer
 
 
 def depth_buffer(depth: np.ndarray, scene: Any) -> np.ndarray:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import mujoco
 from dm_control.mujoco import engine, wrapper  # pyright: ignore[reportMissingImports]
 
+from mjsense.compat._opengl import Look
 from mjsense.rendering.renderer import Renderer
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ class Context:
         self.cameras: dict[tuple[Any, ...], Any] = {}
 
     def renderer_of(self, physics: Any, scene: Any) -> Renderer:
-        renderer = Renderer.of_scene(physics.model.ptr, scene, 1, 1)
+        renderer = physics._mjsense_look.give(Renderer.of_scene(physics.model.ptr, scene, 1, 1))
         self.renderers.add(renderer)
         return renderer
 
@@ -88,10 +89,11 @@ def _make_contexts(physics: Any) -> None:
 def _copy(physics: Any, share_model: bool = False) -> Any:
     made = _opengl["copy"](physics, share_model)
     made._uses_mjsense = getattr(physics, "_uses_mjsense", False)
+    made._mjsense_look = getattr(physics, "_mjsense_look", Look())
     return made
 
 
-def _follow_recompilation(env: Any) -> None:
+def _follow_recompilation(env: Any, look: Look) -> None:
     """Environments of dm_control's composer make a new physics when their model changes, usually for each episode."""
     recompile = getattr(env, "_recompile_physics", None)
     owner = getattr(recompile, "__self__", None)  # `env`, or the one in its wrapper; None if this was done before
@@ -100,7 +102,7 @@ def _follow_recompilation(env: Any) -> None:
 
     def recompile_and_use() -> None:
         recompile()
-        owner._physics._uses_mjsense = True
+        owner._physics._uses_mjsense, owner._physics._mjsense_look = True, look
 
     owner._recompile_physics = recompile_and_use
 
@@ -157,29 +159,38 @@ def _camera_render(
         return renderer.render_images((kind,), height=camera.height, width=camera.width)[kind]
 
 
-def use(env: Any = None) -> Any:
+def use(env: Any = None, shading: str = "classic", environment: str = "model") -> Any:
     """Makes dm_control's images come from mjsense: ``Physics.render``, ``Camera`` and the wrappers that call them.
 
     Overlay texts are an error; `render_flag_overrides` and `scene_option` have the same limits as in ``mjsense.Renderer``.
 
     Args:
-        env: the environment, or the ``Physics``; None for all of this process that have not rendered yet. Copies that ``copy.deepcopy`` or
-            pickle make use mjsense only with None.
+        env: the environment, or the ``Physics``; None for all of this process that have not rendered yet. Copies that
+            ``copy.deepcopy`` or pickle make use mjsense only with None.
+        shading: ``classic``: the colours of MuJoCo's OpenGL renderer. ``pbr``: physically based colours. ``path``: path
+            tracing.
+        environment: With ``pbr`` and ``path``, the light from the surroundings, as the option of cameras.
 
     Returns:
         `env`.
+
+    Raises:
+        TypeError: If `env` has no physics of dm_control.
+        ValueError: For an unknown `shading`.
     """
+    look = Look(shading, environment).checked("mjsense.compat.dm_control.use")
     physics = engine.Physics if env is None else getattr(env, "physics", env)
     if env is not None and not isinstance(physics, engine.Physics):
         raise TypeError(
-            f"mjsense.compat.dm_control.use: {env} has no physics of type dm_control.mujoco.Physics; call use() before environments are made"
+            f"mjsense.compat.dm_control.use: {env} has no physics of type dm_control.mujoco.Physics; call use() "
+            "before environments are made"
         )
     engine.Physics.copy = _copy
     engine.Physics._make_rendering_contexts = _make_contexts
     engine.Physics.render = _physics_render
     engine.Camera.render = _camera_render
-    physics._uses_mjsense = True
-    _follow_recompilation(env)
+    physics._uses_mjsense, physics._mjsense_look = True, look
+    _follow_recompilation(env, look)
     if env is not None and physics._contexts:
         physics._free_rendering_contexts()
     return env

@@ -5,8 +5,8 @@
     env.reset()
     env.render()
 
-``use`` works for every environment with a ``MujocoRenderer``: Gymnasium's own, gymnasium-robotics, Meta-World. In a vector environment,
-call it in the function that makes each environment.
+``use`` works for every environment with a ``MujocoRenderer``: Gymnasium's own, gymnasium-robotics, Meta-World. In a vector
+environment, call it in the function that makes each environment.
 """
 
 from __future__ import annotations
@@ -22,18 +22,26 @@ except ModuleNotFoundError as error:
     message = f"Gymnasium's MuJoCo environments need {error.name}: pip install 'gymnasium[mujoco]' ({error})"
     raise ModuleNotFoundError(message, name=error.name) from error
 
-from mjsense.compat._opengl import depth_buffer
+from mjsense.compat._opengl import Look, depth_buffer
 from mjsense.rendering.renderer import Renderer, camera_of_name
 
 
 class Viewer(OffScreenViewer):
     """Gymnasium's offscreen viewer; ``render`` has its arguments and results.
 
-    Depth is 0 at the near plane and 1 at the far plane, as OpenGL stores it, and 1 where nothing is seen. Overlay texts are not drawn.
+    Depth is 0 at the near plane and 1 at the far plane, as OpenGL stores it, and 1 where nothing is seen. Overlay texts are not
+    drawn.
     """
 
     def __init__(
-        self, model: Any, data: Any, width: int, height: int, max_geom: int = 1000, visual_options: dict[int, bool] | None = None
+        self,
+        model: Any,
+        data: Any,
+        width: int,
+        height: int,
+        max_geom: int = 1000,
+        visual_options: dict[int, bool] | None = None,
+        look: Look | None = None,
     ) -> None:
         # The base class's constructor would make an OpenGL context.
         self.model, self.data = model, data
@@ -46,7 +54,7 @@ class Viewer(OffScreenViewer):
         self.pert = mujoco.MjvPerturb()
         for flag, value in (visual_options or {}).items():
             self.vopt.flags[flag] = value
-        self._renderer = Renderer.of_scene(model, self.scn, height, width)
+        self._renderer = (look or Look()).give(Renderer.of_scene(model, self.scn, height, width))
         self._init_camera()
 
     def make_context_current(self) -> None:
@@ -80,7 +88,8 @@ class Viewer(OffScreenViewer):
 
 
 def _drawn(env: Any) -> Any:
-    """The environment that has the ``MujocoRenderer``: `env`, or one that it contains, as gymnasium-robotics' kitchen and mazes do."""
+    """The environment that has the ``MujocoRenderer``: `env`, or one that it contains, as gymnasium-robotics' kitchen and mazes
+    do."""
     if isinstance(env, VectorEnv):
         raise TypeError(
             f"mjsense.compat.gymnasium.use: {env} is a vector environment; call use in the function that makes each environment"
@@ -90,7 +99,8 @@ def _drawn(env: Any) -> Any:
         if isinstance(getattr(each, "mujoco_renderer", None), MujocoRenderer):
             return each
     raise TypeError(
-        f"mjsense.compat.gymnasium.use: expected an environment with a mujoco_renderer of type gymnasium.envs.mujoco.MujocoRenderer, got {env!r:.100}"
+        "mjsense.compat.gymnasium.use: expected an environment with a mujoco_renderer of type "
+        f"gymnasium.envs.mujoco.MujocoRenderer, got {env!r:.100}"
     )
 
 
@@ -98,17 +108,25 @@ def renderer_of(env: Any) -> MujocoRenderer:
     return _drawn(env).mujoco_renderer
 
 
-def use(env: Any) -> Any:
+def use(env: Any, shading: str = "classic", environment: str = "model") -> Any:
     """Makes the environment's ``MujocoRenderer`` draw with mjsense, for all render modes but ``human``; returns `env`.
+
+    Args:
+        env: The environment.
+        shading: ``classic``: the colours of MuJoCo's OpenGL renderer. ``pbr``: physically based colours. ``path``: path tracing.
+        environment: With ``pbr`` and ``path``, the light from the surroundings, as the option of cameras.
 
     Raises:
         TypeError: if the environment has no ``MujocoRenderer``.
-        ValueError: if its ``camera_name`` does not exist, for which Gymnasium shows the free camera.
+        ValueError: if its ``camera_name`` does not exist, for which Gymnasium shows the free camera; for an unknown `shading`.
     """
+    look = Look(shading, environment).checked("mjsense.compat.gymnasium.use")
     renderer = renderer_of(env)
     name = getattr(_drawn(env), "camera_name", None)
     if name is not None:
         camera_of_name(renderer.model, name)
+    if (earlier := renderer._viewers.pop("mjsense", None)) is not None:  # of another call, with other shading
+        earlier.close()
     get_viewer = renderer._get_viewer
 
     def viewer_of(render_mode: str | None) -> Any:
@@ -117,7 +135,9 @@ def use(env: Any) -> Any:
         viewer = renderer._viewers.get("mjsense")
         if viewer is None:
             assert renderer.width is not None and renderer.height is not None
-            viewer = Viewer(renderer.model, renderer.data, renderer.width, renderer.height, renderer.max_geom, renderer._vopt)
+            viewer = Viewer(
+                renderer.model, renderer.data, renderer.width, renderer.height, renderer.max_geom, renderer._vopt, look
+            )
             renderer.viewer = renderer._viewers["mjsense"] = viewer
             renderer._set_cam_config()
         renderer.viewer = viewer

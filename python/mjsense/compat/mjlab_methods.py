@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sensors with the methods of mjlab: ``edit_spec(spec, entities)``, ``initialize(mj_model, model, data, device)``, ``_compute_data()``."""
+"""Sensors with the methods of mjlab: ``edit_spec(spec, entities)``, ``initialize(mj_model, model, data, device)``,
+``_compute_data()``."""
 
 from __future__ import annotations
 

@@ -15,12 +15,15 @@ import mujoco
 import numpy as np
 import robosuite.environments.base as base  # pyright: ignore[reportMissingImports]
 
-from mjsense.compat._opengl import depth_buffer
+from mjsense.compat._opengl import Look, depth_buffer
 from mjsense.rendering.renderer import Renderer
 
 
 class RenderContext:
     """The part of robosuite's ``MjRenderContextOffscreen`` that environments use. Images start with the bottom row, as there."""
+
+    look = Look()
+    """Of contexts that are made from now on."""
 
     def __init__(self, sim: Any, device_id: int = -1, max_width: int = 640, max_height: int = 480) -> None:
         self.sim, self.device_id, self.offscreen = sim, device_id, True
@@ -33,7 +36,7 @@ class RenderContext:
         self.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
         self.vopt = mujoco.MjvOption()
         self.pert = mujoco.MjvPerturb()
-        self._renderer = Renderer.of_scene(sim.model._model, self.scn, max_height, max_width)
+        self._renderer = self.look.give(Renderer.of_scene(sim.model._model, self.scn, max_height, max_width))
 
     def update_offscreen_size(self, width: int, height: int) -> None:
         """Images may have any size."""
@@ -48,7 +51,8 @@ class RenderContext:
         mujoco.mjv_updateScene(model, data, self.vopt, self.pert, self.cam, mujoco.mjtCatBit.mjCAT_ALL, self.scn)
 
     def read_pixels(self, width: int, height: int, depth: bool = False, segmentation: bool = False) -> Any:
-        """rgb uint8 [H, W, 3], or (object type, id) int32 [H, W, 2] with `segmentation`; with `depth` a pair with float32 [H, W], 0 to 1."""
+        """rgb uint8 [H, W, 3], or (object type, id) int32 [H, W, 2] with `segmentation`; with `depth` a pair with float32 [H, W],
+        0 to 1."""
         color = "segmentation" if segmentation else "rgb"
         images = self._renderer.render_images((color, "depth") if depth else (color,), height=height, width=width)
         image = images[color][::-1]
@@ -62,6 +66,15 @@ class RenderContext:
         self._renderer.reload()
 
 
-def use() -> None:
-    """Makes all robosuite environments of this process that are made from now on draw with mjsense."""
+def use(shading: str = "classic", environment: str = "model") -> None:
+    """Makes all robosuite environments of this process that are made from now on draw with mjsense.
+
+    Args:
+        shading: ``classic``: the colours of MuJoCo's OpenGL renderer. ``pbr``: physically based colours. ``path``: path tracing.
+        environment: With ``pbr`` and ``path``, the light from the surroundings, as the option of cameras.
+
+    Raises:
+        ValueError: For an unknown `shading`.
+    """
+    RenderContext.look = Look(shading, environment).checked("mjsense.compat.robosuite.use")
     base.MjRenderContextOffscreen = RenderContext

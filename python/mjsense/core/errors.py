@@ -32,8 +32,8 @@ def unexpected_keyword(context: str, name: str, known: Iterable[str]) -> TypeErr
 
 
 def nearest(name: str, known: Iterable[str], cutoff: float = 0.6) -> list[str]:
-    """Up to three names that are similar to ``name``: first those with the same last part (``robot/base`` for ``base``), then those that differ
-    least, whatever the case of their letters; without these, those whose last parts differ least."""
+    """Up to three names that are similar to ``name``: first those with the same last part (``robot/base`` for ``base``), then
+    those that differ least, whatever the case of their letters; without these, those whose last parts differ least."""
     known = list(known)
 
     def close(part: Callable[[str], str]) -> list[str]:
@@ -50,8 +50,8 @@ def did_you_mean(name: str, known: Iterable[str], listing: str = "") -> str:
     """The end of a message about an unknown name: ``"; did you mean 'qpos' or 'qvel'?"``.
 
     Args:
-        listing: Words before a list of the first 40 known names, which follows if none is similar: ``"; there are qpos, qvel"``. Without
-            these words the result is then empty.
+        listing: Words before a list of the first 40 known names, which follows if none is similar: ``"; there are qpos, qvel"``.
+            Without these words the result is then empty.
     """
     known = list(dict.fromkeys(known))
     if near := nearest(name, known):

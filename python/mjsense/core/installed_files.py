@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files of installed packages: meshes of robots, and folders that scenes refer to. Without meshes, robots are drawn with built-in primitive
-shapes; their motion is the same."""
+"""Files of installed packages: meshes of robots, and folders that scenes refer to. Without meshes, robots are drawn with built-in
+primitive shapes; their motion is the same."""
 
 from __future__ import annotations
 

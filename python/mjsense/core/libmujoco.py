@@ -3,11 +3,12 @@
 
 The extension needs a library of the name libmj_mjsense.so. ``_lib`` contains two of them:
 
-* ``_lib/libmj_mjsense.so`` is a complete copy of the libmujoco that the extension was compiled with. It is loaded unless the environment's
-  ``mujoco`` is of the same series, so that any other version, or none, may be installed and imported before or after.
-* ``_lib/shared/libmj_mjsense.so`` is empty. If the environment's ``mujoco`` is of the same series, it is loaded first, and the symbols of
-  that libmujoco are made global: the dynamic linker takes the name as loaded and finds the functions in the global scope. The process then
-  contains one libmujoco, and MjModel and MjData objects are shared by pointer.
+* ``_lib/libmj_mjsense.so`` is a complete copy of the libmujoco that the extension was compiled with. It is loaded unless the
+  environment's ``mujoco`` is of the same series, so that any other version, or none, may be installed and imported before or
+  after.
+* ``_lib/shared/libmj_mjsense.so`` is empty. If the environment's ``mujoco`` is of the same series, it is loaded first, and the
+  symbols of that libmujoco are made global: the dynamic linker takes the name as loaded and finds the functions in the global
+  scope. The process then contains one libmujoco, and MjModel and MjData objects are shared by pointer.
 """
 
 from __future__ import annotations
@@ -94,8 +95,9 @@ def load() -> None:
         ctypes.CDLL(os.fspath(_LIB / "shared" / "libmj_mjsense.so"))
     except (LookupError, OSError) as error:
         shared, why_not_shared = None, str(error)
-        # The linker looks for symbols in the global scope first. No package puts a libmujoco there, but a program may be linked with one,
-        # or load `mujoco` with RTLD_GLOBAL. Only then is the order reversed: RTLD_DEEPBIND also bypasses a preloaded malloc.
+        # The linker looks for symbols in the global scope first. No package puts a libmujoco there, but a program may be linked
+        # with one, or load `mujoco` with RTLD_GLOBAL. Only then is the order reversed: RTLD_DEEPBIND also bypasses a preloaded
+        # malloc.
         if hasattr(ctypes.CDLL(None), "mj_version"):
             flags |= os.RTLD_DEEPBIND
     before = sys.getdlopenflags()
@@ -128,4 +130,7 @@ def check(core: ModuleType) -> None:
 def explain() -> str:
     """Why MuJoCo's own functions cannot take objects of mjsense, and what to install."""
     built = ".".join(map(str, SERIES))
-    return f"mjsense uses its own libmujoco {built} because {why_not_shared}; pip install '{REQUIREMENT}' to share objects with mujoco"
+    return (
+        f"mjsense uses its own libmujoco {built} because {why_not_shared}; pip install '{REQUIREMENT}' to share "
+        "objects with mujoco"
+    )

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """MuJoCo's Python objects: those of the environment's ``mujoco`` if it is of the series that mjsense is built for, else views.
 
-A view has the attributes of ``mujoco.MjModel`` or ``mujoco.MjData``: numbers, NumPy arrays on the memory of the struct, ``opt``, ``vis``,
-``stat``, contacts, and the elements by name (``model.geom("box").size``). MuJoCo's functions cannot take it.
+A view has the attributes of ``mujoco.MjModel`` or ``mujoco.MjData``: numbers, NumPy arrays on the memory of the struct, ``opt``,
+``vis``, ``stat``, contacts, and the elements by name (``model.geom("box").size``). MuJoCo's functions cannot take it.
 """
 
 from __future__ import annotations

@@ -16,8 +16,8 @@ _MARK = ".mjsense_part"
 
 @contextlib.contextmanager
 def new_output(out: str | Path) -> Iterator[Path]:
-    """A path in the folder ``OUT.part`` to write to, a file or a folder that is to be made. At the end it is renamed to ``out``; after an
-    error it is deleted. ``out`` must not exist, or be an empty folder, and no other process may write it."""
+    """A path in the folder ``OUT.part`` to write to, a file or a folder that is to be made. At the end it is renamed to ``out``;
+    after an error it is deleted. ``out`` must not exist, or be an empty folder, and no other process may write it."""
     with part_of(Path(out)) as part, complete_output(Path(out), part) as path:
         yield path
 
@@ -31,8 +31,8 @@ def part_of(final: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def own_folder(path: Path, in_use: str) -> Iterator[Path]:
-    """A new folder for this process, which is deleted at the end. One that a killed process has left is emptied and used; a folder or file of
-    another origin stays as it is and is an error.
+    """A new folder for this process, which is deleted at the end. One that a killed process has left is emptied and used; a
+    folder or file of another origin stays as it is and is an error.
 
     Args:
         in_use: Message of the FileExistsError if another process uses it.

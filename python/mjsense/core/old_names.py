@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Old names: modules, names at the top of ``mjsense``, arguments and their order. They work for one version, with a warning that gives the new one."""
+"""Old names: modules, names at the top of ``mjsense``, arguments and their order. They work for one version, with a warning that
+gives the new one."""
 
 from __future__ import annotations
 

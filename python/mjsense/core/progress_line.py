@@ -32,8 +32,8 @@ class ProgressLine:
         """Shows the text, unless the one before is very recent.
 
         Args:
-            mark: The state of the work, such as the number of ended episodes. Where lines are not overwritten, another value shows the text
-                after one second instead of ten.
+            mark: The state of the work, such as the number of ended episodes. Where lines are not overwritten, another value
+                shows the text after one second instead of ten.
             last: Show the text in any case, and end the line.
         """
         now = time.monotonic()
@@ -77,7 +77,8 @@ def terminal_width(stream: TextIO) -> int:
 
 
 def line_of(progress: Any) -> ProgressLine | None:
-    """The line that an argument ``progress`` asks for: True: one; None: one where it can be overwritten; False or a function: none."""
+    """The line that an argument ``progress`` asks for: True: one; None: one where it can be overwritten; False or a function:
+    none."""
     return ProgressLine() if progress is True or (progress is None and interactive()) else None
 
 
@@ -105,7 +106,8 @@ def tracked(items: Iterable[T], total: int, what: str, *, enabled: bool | None =
 
 
 def counter(what: str, progress: bool | Callable[[int, int], None] | None) -> Callable[[int, int], None]:
-    """``progress`` itself if it is a function; otherwise a function of the number of items that are done and of all, which shows them.
+    """``progress`` itself if it is a function; otherwise a function of the number of items that are done and of all, which shows
+    them.
 
     Args:
         what: Name of the items in the plural.

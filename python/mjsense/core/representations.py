@@ -42,7 +42,8 @@ def rows_of(specs: Mapping[str, Any], num_worlds: int | None) -> list[Row]:
 
 
 def plain(text: object, limit: int = 300) -> str:
-    """A text of a file, a model or an error as one line or more of plain text for a page: printable, and shortened to ``limit`` characters."""
+    """A text of a file, a model or an error as one line or more of plain text for a page: printable, and shortened to ``limit``
+    characters."""
     shown = printable(str(text)[: limit + 1])
     return shown if len(shown) <= limit else shown[: limit - 1] + "\N{HORIZONTAL ELLIPSIS}"
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The spec of a scene for functions that edit it, in environments whose ``mujoco`` is of another series or missing.
 
-It has the attributes of ``mujoco.MjSpec`` that edits use: lists of elements, look-ups by name, ``add_...`` methods, and the fields of elements.
-Enumerators may come from any version of ``mujoco``.
+It has the attributes of ``mujoco.MjSpec`` that edits use: lists of elements, look-ups by name, ``add_...`` methods, and the
+fields of elements. Enumerators may come from any version of ``mujoco``.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reading of recordings: rows and frames, statistics, replay in MuJoCo, and rendering again. h5py is imported at the first access to a file."""
+"""Reading of recordings: rows and frames, statistics, replay in MuJoCo, and rendering again. h5py is imported at the first access
+to a file."""
 
 from mjsense.dataset.dataset import Dataset
 from mjsense.dataset.deviation import Deviation

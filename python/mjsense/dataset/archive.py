@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Model archives: ZIP files with a model and the files that it names. They may come from anyone, so their sizes and names are checked
-before anything is decompressed, and nothing is written to disk."""
+"""Model archives: ZIP files with a model and the files that it names. They may come from anyone, so their sizes and names are
+checked before anything is decompressed, and nothing is written to disk."""
 
 from __future__ import annotations
 
@@ -22,14 +22,16 @@ MAX_BYTES = 1 << 30
 MAX_MEMBERS = 20_000
 MAX_NAME = 255  # bytes
 MAX_RATIO, RATIO_FROM = 100, 64 << 20
-"""Meshes and textures shrink to a tenth at best. More than this ratio is refused from this size on; small files of zeros may have it."""
+"""Meshes and textures shrink to a tenth at best. More than this ratio is refused from this size on; small files of zeros may have
+it."""
 
 _END = struct.Struct("<4s4H2LH")  # the record at the end of a ZIP file
 _DIRECTORY_ENTRY = 46 + MAX_NAME + 64  # bytes: the fixed part, a name, and some extra fields
 
 
 def read_archive(path: Path) -> dict[str, bytes]:
-    """The files of a model archive by name. Raises ValueError if it is damaged, exceeds a limit, or has names that are not plain."""
+    """The files of a model archive by name. Raises ValueError if it is damaged, exceeds a limit, or has names that are not
+    plain."""
     with open_plain(path) as file:
         return files_of(file, path)
 
@@ -84,7 +86,8 @@ def _refusal(about: object, reason: str) -> ValueError:
 
 
 def _check_directory(file: IO[bytes], about: object) -> None:
-    """Checks the size of the directory before zipfile loads it. Archives of recordings have neither a comment nor 64-bit records."""
+    """Checks the size of the directory before zipfile loads it. Archives of recordings have neither a comment nor 64-bit
+    records."""
     size = file.seek(0, os.SEEK_END)
     if size > MAX_BYTES:
         raise _refusal(about, f"it has {size} bytes, the limit is {MAX_BYTES}")

@@ -11,7 +11,8 @@ from typing import Any
 
 
 class Cache:
-    """Values by key, at most ``limit`` bytes (the newest value always stays). A pickled cache is empty; a forked one has its own lock.
+    """Values by key, at most ``limit`` bytes (the newest value always stays). A pickled cache is empty; a forked one has its own
+    lock.
 
     ``per_process`` says that values cannot be used in a forked process.
     """

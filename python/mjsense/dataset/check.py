@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the readers of recordings refuse, for ``mjsense verify``: a recording without findings is read by every command.
 
-The C++ library compares checksums and examines the structure of the files. This module opens each episode with the readers that all Python
-commands use, so that neither accepts what the other refuses.
+The C++ library compares checksums and examines the structure of the files. This module opens each episode with the readers that
+all Python commands use, so that neither accepts what the other refuses.
 """
 
 from __future__ import annotations
@@ -87,8 +87,8 @@ def _check_rows(episode: Episode) -> None:
 
 
 def _check_streams(episode: Episode) -> None:
-    """Every dataset can be a stream, and has the type and shape that it has in the episode before. If the recording lists its streams, all of them are
-    in every episode."""
+    """Every dataset can be a stream, and has the type and shape that it has in the episode before. If the recording lists its
+    streams, all of them are in every episode."""
     known, index = episode._store.known, episode._entry.recording
     before = known.pop(index, {})
     streams = episode.streams  # opens all datasets
@@ -98,7 +98,8 @@ def _check_streams(episode: Episode) -> None:
         now = known[index].get(place)
         if now is not None and (now.dtype, now.shape) != (stream.dtype, stream.shape):
             raise ValueError(
-                f"{place} is {now.dtype} {list(now.shape)}; in another episode of the recording it is {stream.dtype} {list(stream.shape)}"
+                f"{place} is {now.dtype} {list(now.shape)}; in another episode of the recording it is "
+                f"{stream.dtype} {list(stream.shape)}"
             )
         if stream.name not in streams and not place.startswith(_OPTIONAL) and "streams" in episode._recording.provenance:
             raise ValueError(f"has no '{place}', which another episode of the recording has")

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """MJCF of untrusted files in a form in which MuJoCo reads the files of an archive and no others.
 
-MuJoCo reads a file from disk if it is not among those in memory: when it parses (``include``, ``model``, ``flexcomp``) and when it compiles
-(meshes, textures, height fields, skins). Therefore the text that it gets is written here, from the elements that a strict XML parser has found:
-no element that reads files when it is parsed, and no name of a file that is not a member of the archive. What the elements ask for, such as
-textures of 60,000 x 60,000 pixels, is counted before MuJoCo allocates it.
+MuJoCo reads a file from disk if it is not among those in memory: when it parses (``include``, ``model``, ``flexcomp``) and when
+it compiles (meshes, textures, height fields, skins). Therefore the text that it gets is written here, from the elements that a
+strict XML parser has found: no element that reads files when it is parsed, and no name of a file that is not a member of the
+archive. What the elements ask for, such as textures of 60,000 x 60,000 pixels, is counted before MuJoCo allocates it.
 """
 
 from __future__ import annotations
@@ -53,7 +53,8 @@ _REFUSED = {"include": "reads other files", "attach": "reads other files", "mode
 
 
 def parsed(text: str | bytes, about: str) -> Element:
-    """The root of a model's MJCF: elements and attributes only. Raises ValueError for a document type, entities, and text beyond the limits."""
+    """The root of a model's MJCF: elements and attributes only. Raises ValueError for a document type, entities, and text beyond
+    the limits."""
     from xml.etree.ElementTree import TreeBuilder  # slow to import
 
     if len(text) > MAX_TEXT:
@@ -70,7 +71,8 @@ def parsed(text: str | bytes, about: str) -> Element:
         for key, value in attributes.items():
             if "%" in value and _CONVERSION.search(value):
                 raise ValueError(
-                    f"{about}: line {parser.CurrentLineNumber}: {key[:40]} of '{tag[:40]}' is {value[:60]!r}, which is a format of printf"
+                    f"{about}: line {parser.CurrentLineNumber}: {key[:40]} of '{tag[:40]}' is {value[:60]!r}, which "
+                    "is a format of printf"
                 )
         builder.start(tag, attributes)
 
@@ -99,7 +101,8 @@ def close_names(root: Element, find: Callable[[Element, str, str, str], str], ab
     """Replaces all names of files by those that ``find`` gives, which are relative to no folder.
 
     Args:
-        find: Given an element, the attribute, its value and the folder that the model states for it. It raises ValueError for unknown files.
+        find: Given an element, the attribute, its value and the folder that the model states for it. It raises ValueError for
+            unknown files.
     """
     for element in root.iter():
         if element.tag in _REFUSED:
@@ -112,12 +115,14 @@ def close_names(root: Element, find: Callable[[Element, str, str, str], str], ab
             )
             if named or (key in SIDES and element.tag != "texture"):
                 raise ValueError(
-                    f"{about}: the element '{element.tag[:40]}' names a file ('{key[:40]}'), expected one of {', '.join(FILE_TAGS)}"
+                    f"{about}: the element '{element.tag[:40]}' names a file ('{key[:40]}'), expected one of "
+                    f"{', '.join(FILE_TAGS)}"
                 )
         kind = element.get("content_type")
         if kind is not None and kind not in _CONTENT:
             raise ValueError(
-                f"{about}: the content_type {kind[:80]!r} of '{element.tag[:40]}' is unknown, expected one of {', '.join(sorted(_CONTENT))}"
+                f"{about}: the content_type {kind[:80]!r} of '{element.tag[:40]}' is unknown, expected one of "
+                f"{', '.join(sorted(_CONTENT))}"
             )
         plugin = element.get("plugin")
         if plugin is not None and not re.fullmatch(r"mujoco\.[\w.]{1,80}", plugin):
@@ -160,7 +165,8 @@ def check_member(element: Element, name: str, about: str) -> None:
         )
     if element.tag == "mesh" and not name.lower().endswith(_MESHES):
         raise ValueError(
-            f"{about}: the mesh '{element.get('name', '')[:80]}' names the file {name[:80]!r}, expected one of {', '.join(_MESHES)}"
+            f"{about}: the mesh '{element.get('name', '')[:80]}' names the file {name[:80]!r}, expected one of "
+            f"{', '.join(_MESHES)}"
         )
 
 
@@ -185,7 +191,8 @@ def closed_model(text: str | bytes, members: Mapping[str, bytes], about: str) ->
                 check_member(element, name, about)
                 return name
         raise ValueError(
-            f"{about}: the {element.tag} '{element.get('name', '')[:80]}' names the file {file[:120]!r}, which is not in the archive"
+            f"{about}: the {element.tag} '{element.get('name', '')[:80]}' names the file {file[:120]!r}, which is "
+            "not in the archive"
         )
 
     close_names(root, find, about)
@@ -194,7 +201,8 @@ def closed_model(text: str | bytes, members: Mapping[str, bytes], about: str) ->
 
 
 def check_archive(path: str | Path) -> None:
-    """Raises ValueError, with one line, if the files of an archive cannot be read, or if its model names other files or is too large.
+    """Raises ValueError, with one line, if the files of an archive cannot be read, or if its model names other files or is too
+    large.
 
     The model is not compiled.
     """
@@ -204,7 +212,8 @@ def check_archive(path: str | Path) -> None:
 
 
 def compile_closed(files: Mapping[str, bytes], about: str) -> mujoco.MjModel:
-    """The model of an archive's files. ``about`` names the archive in errors; the package ``mujoco`` must be of mjsense's series."""
+    """The model of an archive's files. ``about`` names the archive in errors; the package ``mujoco`` must be of mjsense's
+    series."""
     members = {name: content for name, content in files.items() if name != MODEL_FILE}
     text = closed_model(files[MODEL_FILE], members, f"{about}: {MODEL_FILE}")
     with compiling(about):

@@ -32,24 +32,25 @@ _PROBED = 16  # episodes of each recording whose JSON rows are read to know thei
 class Dataset:
     """Observations of a recording by number: ``len(dataset)``, ``dataset[i]``. See docs/datasets.md.
 
-    ``dataset[i]`` is a dict: a NumPy array for every stream, and ``episode_index``, ``frame_index``, ``index``, ``timestamp`` (seconds
-    since the start of the episode) and ``task`` (the instruction). It works with ``torch.utils.data.DataLoader`` and any number of
-    workers, forked or spawned. Row t of ``actions/*`` is the action that led to observation t.
+    ``dataset[i]`` is a dict: a NumPy array for every stream, and ``episode_index``, ``frame_index``, ``index``, ``timestamp``
+    (seconds since the start of the episode) and ``task`` (the instruction). It works with ``torch.utils.data.DataLoader`` and any
+    number of workers, forked or spawned. Row t of ``actions/*`` is the action that led to observation t.
 
     Args:
-        root: Output directory of a recording or of its shards, its ``index.parquet``, one of the ``house_N`` folders, one HDF5 file, or an
-            address that fsspec reads (``s3://bucket/pick``).
+        root: Output directory of a recording or of its shards, its ``index.parquet``, one of the ``house_N`` folders, one HDF5
+            file, or an address that fsspec reads (``s3://bucket/pick``).
         episodes: Positions of episodes in the recording, or a mask; by default all.
         delta_timestamps: Windows: seconds relative to the observation, by stream or group. The stream becomes ``[n, ...]``, and
             ``{stream}_is_pad`` says which entries lie outside the episode; those repeat its first or last row.
-        streams: Names of streams, of groups (``"obs/agent/qpos"``, ``"actions"``), or patterns (``"obs/sensor_data/*"``); by default all
-            streams but ``replay/*``.
-        outcome: Only episodes with this outcome: a text, a pattern (``"horizon reached*"``), several of them, or a function of the text.
+        streams: Names of streams, of groups (``"obs/agent/qpos"``, ``"actions"``), or patterns (``"obs/sensor_data/*"``); by
+            default all streams but ``replay/*``.
+        outcome: Only episodes with this outcome: a text, a pattern (``"horizon reached*"``), several of them, or a function of
+            the text.
         success: Only successful (True) or only failed (False) episodes.
         houses: Only episodes of these houses.
         where: Only episodes for which this function is true: ``lambda episode: episode.quality.idle < 0.1``.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`Episode.trimmed`). Numbers of observations, times and windows count
-            what is left.
+        trim_idle: Leave out the steps in which nothing moves (:meth:`Episode.trimmed`). Numbers of observations, times and
+            windows count what is left.
         tolerance_s: Maximum difference between an entry of ``delta_timestamps`` and a multiple of the period. [s]
         cache_mb: Memory for decoded rows and frames of one process, half for each. [MB]
     """
@@ -200,8 +201,8 @@ class Dataset:
     def stats(self, streams: Iterable[str] | None = None, *, frames: int = 200) -> dict[str, dict[str, np.ndarray]]:
         """min, max, mean, std, count, q01, q10, q50, q90 and q99 of each stream over all observations.
 
-        NaN is skipped, as are rows of actions that are not given. Images have the shape (3, 1, 1) and the range 0 to 1. Texts and streams
-        with rows of 64 kB or more (segmentation) have no statistics.
+        NaN is skipped, as are rows of actions that are not given. Images have the shape (3, 1, 1) and the range 0 to 1. Texts and
+        streams with rows of 64 kB or more (segmentation) have no statistics.
 
         Args:
             streams: Names, groups or patterns; by default the streams of this data set.
@@ -235,12 +236,14 @@ class Dataset:
         for episode in {episode._entry.recording: episode for episode in self.episodes}.values():
             if episode.fps != first.fps:
                 raise ValueError(
-                    f"{first.path} has {first.fps} observations per second, {episode.path} has {episode.fps}; choose houses with one rate"
+                    f"{first.path} has {first.fps} observations per second, {episode.path} has {episode.fps}; "
+                    "choose houses with one rate"
                 )
         return first.fps
 
     def _expand_all(self, names: Iterable[str], known: dict[str, Stream]) -> list[str]:
-        """Streams that names, groups and patterns stand for. An unknown name is looked up in all episodes; ``known`` receives it."""
+        """Streams that names, groups and patterns stand for. An unknown name is looked up in all episodes; ``known`` receives
+        it."""
         result: list[str] = []
         for name in names:
             try:
@@ -256,7 +259,8 @@ class Dataset:
         return result
 
     def _known_streams(self) -> dict[str, Stream]:
-        """Streams that all recordings have. JSON leaves are those of up to 16 episodes of each recording, the first and the last included."""
+        """Streams that all recordings have. JSON leaves are those of up to 16 episodes of each recording, the first and the last
+        included."""
         groups: dict[int, list[Episode]] = {}
         for episode in self.episodes:
             groups.setdefault(episode._entry.recording, []).append(episode)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The attribute ``recording`` of a file: what it states about the recording, checked.
 
-A recording is not trusted. Keys that are not listed here are ignored, and no option of our own programs is taken from it but those in
-``_VIDEO``.
+A recording is not trusted. Keys that are not listed here are ignored, and no option of our own programs is taken from it but
+those in ``_VIDEO``.
 """
 
 from __future__ import annotations
@@ -196,7 +196,8 @@ def rate_of(value: Any, what: str) -> Fraction:
             return rate
     shown = printable(repr(value)[:60])
     raise ValueError(
-        f"{what} is {shown}; it must be a rate from {RATES[0]:g} to {RATES[1]:g} as '15' or '500/33', of at most {RATE_DIGITS} digits each"
+        f"{what} is {shown}; it must be a rate from {RATES[0]:g} to {RATES[1]:g} as '15' or '500/33', of at most "
+        f"{RATE_DIGITS} digits each"
     )
 
 
@@ -211,17 +212,20 @@ def image_size(width: Any, height: Any, what: str) -> tuple[int, int]:
 
 
 def is_known_thing(name: Any) -> bool:
-    """Whether a setting names a task, robot, scene, controller, camera system or surroundings that mjsense contains, or may contain, and not a file."""
+    """Whether a setting names a task, robot, scene, controller, camera system or surroundings that mjsense contains, or may
+    contain, and not a file."""
     return name is None or (isinstance(name, str) and (not name or _KNOWN_THING.fullmatch(name) is not None))
 
 
 def named_file(settings: dict[str, Any]) -> str:
-    """Which of the settings name a file: ``"robot 'mine/robot.toml'"``. Files are not taken from a recording. Empty: none does."""
+    """Which of the settings name a file: ``"robot 'mine/robot.toml'"``. Files are not taken from a recording. Empty: none
+    does."""
     return ", ".join(f"{key} '{printable(str(settings[key])[:100])}'" for key in _THINGS if not is_known_thing(settings.get(key)))
 
 
 def _checked_settings(what: str, settings: dict[str, Any]) -> dict[str, Any]:
-    """The settings, without those of other programs that have the name of a known setting. In a recording of ``mjs.record``, a wrong value is an error."""
+    """The settings, without those of other programs that have the name of a known setting. In a recording of ``mjs.record``, a
+    wrong value is an error."""
     known = dict(settings)
 
     def check(key: str, value: Any, rule: tuple[Check, str], name: str = "") -> None:

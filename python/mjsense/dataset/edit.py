@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings without some episodes, parts of recordings, and several recordings as one. Arrays, videos and checksums stay as they are."""
+"""Recordings without some episodes, parts of recordings, and several recordings as one. Arrays, videos and checksums stay as they
+are."""
 
 from __future__ import annotations
 
@@ -46,8 +47,8 @@ def split_dataset(root: str | Path, out: str | Path, parts: Mapping[str, Any]) -
     Args:
         root: Recording: its folder, an index, one of its ``house_N`` folders, or one HDF5 file.
         out: Folder of the parts. It must not exist.
-        parts: By name either the positions of a part's episodes, or its share of all episodes, 0 to 1: ``{"train": 0.8, "test": 0.2}``.
-            Shares are taken in the order of the names, from the first episode on.
+        parts: By name either the positions of a part's episodes, or its share of all episodes, 0 to 1:
+            ``{"train": 0.8, "test": 0.2}``. Shares are taken in the order of the names, from the first episode on.
 
     Returns:
         The folders by name.
@@ -129,7 +130,8 @@ def _write(episodes: list[Episode], out: Path) -> Path:
 
 
 def _copy_batch(source: Path, episodes: list[Episode], target: Path) -> None:
-    """Copies episodes of an HDF5 file, their videos and the archive of their model. The bytes of a file of which all are copied stay equal."""
+    """Copies episodes of an HDF5 file, their videos and the archive of their model. The bytes of a file of which all are copied
+    stay equal."""
     names = {archive} if (archive := episodes[0]._recording.model_archive) else set()
     with open_h5(source) as file:
         every = [name for name in file if name.startswith("traj_")]

@@ -32,11 +32,12 @@ class Episode(EpisodeRows):
         return idle_steps(self)
 
     def trimmed(self) -> Episode:
-        """This episode without idle steps: a view, whose rows, frames and length are those that are left. The recording stays complete.
+        """This episode without idle steps: a view, whose rows, frames and length are those that are left. The recording stays
+        complete.
 
-        A step is left out if it is idle, no free object moves faster than 0.03 m/s in it, and nothing has moved by more than 0.01 (rad or
-        m) since the last observation that is left. The first observation and the idle steps at the end stay. A trimmed episode can set
-        states, but not simulate its actions.
+        A step is left out if it is idle, no free object moves faster than 0.03 m/s in it, and nothing has moved by more than 0.01
+        (rad or m) since the last observation that is left. The first observation and the idle steps at the end stay. A trimmed
+        episode can set states, but not simulate its actions.
         """
         return self if self._kept is not None else Episode(self._entry, self.index, self._store, kept_rows(self))
 
@@ -65,7 +66,8 @@ class Episode(EpisodeRows):
         """Yields ``(t, data)`` for every observation, always the same ``data``.
 
         Args:
-            from_: ``states`` sets every recorded state; ``actions`` sets the first one and then simulates with the recorded controls.
+            from_: ``states`` sets every recorded state; ``actions`` sets the first one and then simulates with the recorded
+                controls.
             model: Model to use; by default :meth:`model`.
             data: Data of ``model`` to use; by default new data.
         """

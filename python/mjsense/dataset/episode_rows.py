@@ -98,8 +98,8 @@ def is_json(dataset: Rows) -> bool:
 
 
 def _dataset_of(trajectory: Group, name: str) -> tuple[str, Rows] | None:
-    """The dataset that contains a stream, and its place: the stream itself or, for a leaf or a mask, its array of numbers or the JSON rows of
-    a prefix of its name."""
+    """The dataset that contains a stream, and its place: the stream itself or, for a leaf or a mask, its array of numbers or the
+    JSON rows of a prefix of its name."""
     places = [NUMBERS + name, name]
     while "/" in places[-1]:
         places.append(places[-1].rpartition("/")[0])
@@ -110,14 +110,16 @@ def _dataset_of(trajectory: Group, name: str) -> tuple[str, Rows] | None:
 
 
 def check_known(name: str, dataset: Rows) -> None:
-    """Raises an error if rewards or flags are not one number or bool for each observation, or parameters of cameras no matrices."""
+    """Raises an error if rewards or flags are not one number or bool for each observation, or parameters of cameras no
+    matrices."""
     kinds, word = _OF_STEPS.get(name, ("", ""))
     if kinds and (dataset.ndim != 1 or dataset.dtype.kind not in kinds):
         raise ValueError(f"{dataset.where} is {dataset.dtype} {list(dataset.shape)}; it must be one {word} for each observation")
     shape = _OF_CAMERAS.get(name.rpartition("/")[2]) if name.startswith("obs/sensor_param/") else None
     if shape and dataset.shape[1:] != shape:
         raise ValueError(
-            f"{dataset.where} is {dataset.dtype} {list(dataset.shape)}; it must be a matrix of {shape[0]} x {shape[1]} numbers for each observation"
+            f"{dataset.where} is {dataset.dtype} {list(dataset.shape)}; it must be a matrix of {shape[0]} x "
+            f"{shape[1]} numbers for each observation"
         )
 
 
@@ -277,10 +279,11 @@ class EpisodeRows:
         return Video(self._video(camera), self._store.frames, None if self._kept is None else self._kept.tolist())
 
     def image_histogram(self, camera: str) -> np.ndarray | None:
-        """int64 [3, 256]: how often each level of red, green and blue occurs in all images of a camera, counted before they were encoded.
+        """int64 [3, 256]: how often each level of red, green and blue occurs in all images of a camera, counted before they were
+        encoded.
 
-        Of each image every n-th row and column counts, from the first on, with the smallest n with which the longer side has at most 160.
-        None for depth, a trimmed episode, and recordings of earlier versions and of MolmoSpaces.
+        Of each image every n-th row and column counts, from the first on, with the smallest n with which the longer side has at
+        most 160. None for depth, a trimmed episode, and recordings of earlier versions and of MolmoSpaces.
         """
         if self.video(camera).trimmed:
             return None
@@ -300,7 +303,8 @@ class EpisodeRows:
         if info is None:
             cameras = ", ".join(name[len(VIDEOS) :] for name in videos)
             raise UnknownNameError(
-                f"Episode {self.index} ({self.path.name}, {self.trajectory}) has no video '{camera}'; it has {cameras or 'no videos'}"
+                f"Episode {self.index} ({self.path.name}, {self.trajectory}) has no video '{camera}'; it has "
+                f"{cameras or 'no videos'}"
             )
         return info
 
@@ -327,7 +331,8 @@ class EpisodeRows:
         scene = bounded_json.parse_object(text, f"{self.path} {self.trajectory}/obs_scene", SCENE_BYTES)
         if isinstance(scene.get("objects", {}), (bool, int, float, str, type(None))):
             raise ValueError(
-                f"{self.path} {self.trajectory}/obs_scene: objects is {bounded_json.kind_of(scene['objects'])}; it must be an object"
+                f"{self.path} {self.trajectory}/obs_scene: objects is {bounded_json.kind_of(scene['objects'])}; it "
+                "must be an object"
             )
         return scene, 16 * len(text)
 
@@ -350,7 +355,8 @@ class EpisodeRows:
                 width, height = image_size(at.integer("width", 1, 2**31), at.integer("height", 1, 2**31), dataset.where)
                 if (encoding := at.text("encoding")) not in _ENCODINGS:
                     raise ValueError(
-                        f"{dataset.where}: its encoding is '{printable(encoding[:50])}'; it must be one of {', '.join(_ENCODINGS)}"
+                        f"{dataset.where}: its encoding is '{printable(encoding[:50])}'; it must be one of "
+                        f"{', '.join(_ENCODINGS)}"
                     )
                 rate = rate_of(at.text("fps"), f"{dataset.where}: fps")
                 if (stated := self._recording.fps) is not None and rate != stated:
@@ -435,7 +441,8 @@ class EpisodeRows:
         if self._store.leaves is not None and (new := result.keys() - self._store.leaves):
             self._store.leaves |= new
             warnings.warn(
-                f"Episode {self.index} ({self.path}) has {', '.join(sorted(new))}, which the first, the last and other examined episodes "
+                f"Episode {self.index} ({self.path}) has {', '.join(sorted(new))}, which the first, the last and "
+                "other examined episodes "
                 "lack; samples leave it out unless streams= names it",
                 stacklevel=2,
             )
@@ -475,12 +482,14 @@ class EpisodeRows:
         return {name: found[name] for name in names if name in found}
 
     def _checked(self, place: str, dataset: Rows) -> Rows:
-        """The dataset of a stream, if it has a row for each observation, and the type and shape that it has in other episodes of the recording."""
+        """The dataset of a stream, if it has a row for each observation, and the type and shape that it has in other episodes of
+        the recording."""
         check_known(place, dataset)
         stream = self._store.known.get(self._entry.recording, {}).get(place)
         if stream is not None and (dataset.dtype, dataset.shape[1:]) != (stream.dtype, stream.shape):
             raise ValueError(
-                f"{dataset.where} is {dataset.dtype} {list(dataset.shape[1:])}; in another episode of the recording it is {stream.dtype} {list(stream.shape)}"
+                f"{dataset.where} is {dataset.dtype} {list(dataset.shape[1:])}; in another episode of the recording "
+                f"it is {stream.dtype} {list(stream.shape)}"
             )
         return dataset.rows_of(self._entry.length)
 

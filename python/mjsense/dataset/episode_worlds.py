@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A simulation of a recording's archived model, whose worlds show recorded episodes. It works with or without the package ``mujoco``."""
+"""A simulation of a recording's archived model, whose worlds show recorded episodes. It works with or without the package
+``mujoco``."""
 
 from __future__ import annotations
 
@@ -112,7 +113,8 @@ class EpisodeWorlds:
         stored = playback.inputs_of(episode).state.shape[1]
         if stored != sim.state.shape[1]:
             raise ValueError(
-                f"{playback.where(episode)}: the recorded state has {stored} numbers, that of the model has {sim.state.shape[1]}. "
+                f"{playback.where(episode)}: the recorded state has {stored} numbers, that of the model has "
+                f"{sim.state.shape[1]}. "
                 "An edit must not add joints, actuators or bodies."
             )
         check_inputs(
@@ -147,7 +149,8 @@ class EpisodeWorlds:
             return now
         if now.shape != values.shape:
             raise ValueError(
-                f"{playback.where(episode)}: the edited model has another shape of '{name}': {now.shape} instead of {values.shape}. "
+                f"{playback.where(episode)}: the edited model has another shape of '{name}': {now.shape} instead of "
+                f"{values.shape}. "
                 "Only cameras, lights, sites with names, and sensors can be added."
             )
         return values

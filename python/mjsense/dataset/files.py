@@ -98,7 +98,8 @@ def _house(path: Path) -> int | None:
 
 
 def batches(root: Path) -> list[Path]:
-    """HDF5 files of a recording's folder, of one of its shards or houses, or the file itself, in the order of houses, shards and batches."""
+    """HDF5 files of a recording's folder, of one of its shards or houses, or the file itself, in the order of houses, shards and
+    batches."""
     if not root.exists():
         raise missing(root)
     if not root.is_dir():
@@ -176,7 +177,8 @@ def _episodes(file: Group, path: Path, recording: int) -> Iterator[EpisodeEntry]
             raise ValueError(f"{trajectory.where} has no dataset 'success'")
         if not isinstance(flags, Rows) or flags.ndim != 1 or not flags.is_number:
             raise ValueError(
-                f"{flags.where} is {getattr(flags, 'dtype', 'a group')} {list(getattr(flags, 'shape', ()))}; it must be one bool for each observation"
+                f"{flags.where} is {getattr(flags, 'dtype', 'a group')} {list(getattr(flags, 'shape', ()))}; it "
+                "must be one bool for each observation"
             )
         outcome = trajectory.attrs.text("outcome") if "outcome" in trajectory.attrs else None
         if outcome is None:  # MolmoSpaces' files have no attributes

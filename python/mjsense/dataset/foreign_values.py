@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values that the files of other programs state, checked where they are read: each function returns a value of the promised type, or raises
-ValueError with one line that names the file, the place, what was found and what is expected."""
+"""Values that the files of other programs state, checked where they are read: each function returns a value of the promised type,
+or raises ValueError with one line that names the file, the place, what was found and what is expected."""
 
 from __future__ import annotations
 

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """HDF5 files of recordings, which are not trusted: every object and value passes the checks of this module.
 
-Only hard links are followed, so nothing outside of the file is read. The type, shape and size of a dataset are checked before it is read.
-Chunks are unpacked here, because the HDF5 library reads beyond the end of one that is shorter than its shape says. A dataset that is read as a
-whole is compared with its checksum.
+Only hard links are followed, so nothing outside of the file is read. The type, shape and size of a dataset are checked before it
+is read. Chunks are unpacked here, because the HDF5 library reads beyond the end of one that is shorter than its shape says. A
+dataset that is read as a whole is compared with its checksum.
 """
 
 from __future__ import annotations
 
 import contextlib
 import itertools
+import threading
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -38,9 +39,33 @@ def text_of(value: Any) -> str:
     return bytes(value).split(b"\0", 1)[0].decode(errors="replace")
 
 
+class _Kept(threading.local):
+    """The file that this thread keeps open."""
+
+    path: Path | None = None
+    root: Group | None = None
+
+
+_kept = _Kept()
+
+
+@contextlib.contextmanager
+def kept_open(path: Path) -> Iterator[None]:
+    """Inside of the block, this thread opens the file once for all calls of :func:`open_h5`. Blocks cannot be nested."""
+    with open_h5(path) as _kept.root:
+        _kept.path = path
+        try:
+            yield
+        finally:
+            _kept.path = _kept.root = None
+
+
 @contextlib.contextmanager
 def open_h5(path: Path) -> Iterator[Group]:
     """The root group of a file, which is open inside of the block."""
+    if _kept.root is not None and _kept.path == path:
+        yield _kept.root
+        return
     h5py = optional("h5py", "dataset", "Reading recordings")
     with open_plain(path) as plain:
         try:
@@ -101,7 +126,8 @@ class Attributes:
             return None
         if not isinstance(value, np.integer) or not low <= int(value) <= high:
             raise ValueError(
-                f"{self._place}: the attribute '{name}' is {printable(repr(value)[:50])}; it must be a whole number from {low} to {high}"
+                f"{self._place}: the attribute '{name}' is {printable(repr(value)[:50])}; it must be a whole number "
+                f"from {low} to {high}"
             )
         return int(value)
 
@@ -110,7 +136,8 @@ class Attributes:
         value = self.get(name, default)
         if not isinstance(value, (float, np.floating, np.integer)) or not 0 <= float(value) < np.inf:
             raise ValueError(
-                f"{self._place}: the attribute '{name}' is {printable(repr(value)[:50])}; it must be a finite number of at least 0"
+                f"{self._place}: the attribute '{name}' is {printable(repr(value)[:50])}; it must be a finite "
+                "number of at least 0"
             )
         return float(value)
 
@@ -317,7 +344,8 @@ class Rows:
     def _check_sum(self, found: int, stated: str) -> None:
         if f"{found:08x}" != stated:
             raise ValueError(
-                f"{self.where} differs from what was recorded: its checksum is not {printable(stated[:20])}; `mjsense verify` lists what is damaged"
+                f"{self.where} differs from what was recorded: its checksum is not {printable(stated[:20])}; "
+                "`mjsense verify` lists what is damaged"
             )
 
     def _check_storage(self) -> None:

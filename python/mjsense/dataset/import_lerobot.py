@@ -21,7 +21,7 @@ from mjsense.core.errors import UnknownNameError
 from mjsense.core.input_files import missing, read_text
 from mjsense.core.new_output import new_output
 from mjsense.core.optional import optional
-from mjsense.dataset import bounded_json
+from mjsense.dataset import bounded_json, parquet_footer
 from mjsense.dataset import foreign_values as foreign
 from mjsense.dataset.import_rows import NOT_A_NUMBER, Rows, archive_of, compile_archive, unique_name
 from mjsense.dataset.model_fields import MAX_STATE
@@ -59,20 +59,22 @@ def import_lerobot(
     # end of options
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Writes a LeRobot v3.0 data set as a recording, which can be inspected, verified and read, and with ``scene`` replayed and rendered.
+    """Writes a LeRobot v3.0 data set as a recording, which can be inspected, verified and read, and with ``scene`` replayed and
+    rendered.
 
-    A data set has no simulator states. With ``scene``, the numbers of ``observation.state`` are set as positions of joints of this model,
-    and everything else is at its initial position. Row t of the recording has observation t and action t - 1, so the last action of an
-    episode, whose result the data set does not contain, is left out, as are episodes without rows, with a warning. Images are encoded again,
-    as H.264. If an episode has several tasks, ``observation/task`` has the position of each row's task in the list ``tasks`` of ``obs_scene``.
+    A data set has no simulator states. With ``scene``, the numbers of ``observation.state`` are set as positions of joints of
+    this model, and everything else is at its initial position. Row t of the recording has observation t and action t - 1, so the
+    last action of an episode, whose result the data set does not contain, is left out, as are episodes without rows, with a
+    warning. Images are encoded again, as H.264. If an episode has several tasks, ``observation/task`` has the position of each
+    row's task in the list ``tasks`` of ``obs_scene``.
 
     Args:
         root: Folder of the data set.
         out: Folder to write. It must not exist, or be empty; after an error it is not written.
         episodes: Indices of episodes; by default all.
         scene: MJCF file of the robot and its surroundings.
-        joints: With ``scene``: the joint of each number of ``observation.state``, in order; ``""``: none. By default the names of the
-            numbers, which must then be names of joints.
+        joints: With ``scene``: the joint of each number of ``observation.state``, in order; ``""``: none. By default the names of
+            the numbers, which must then be names of joints.
 
         Options:
         batches: Number of HDF5 files over which the episodes are distributed; 0: one per four episodes.
@@ -192,13 +194,11 @@ class _Source:
         """Columns of a Parquet file."""
         place = foreign.regular_inside((self.root,), path, str(path))
         try:
-            about = self._tables.read_metadata(place)
-            groups = [about.row_group(i) for i in range(about.num_row_groups)]
-            count = sum(group.column(i).num_values for group in groups for i in range(group.num_columns))
-            size = sum(group.total_byte_size for group in groups)
-            if about.num_rows > foreign.MAX_ROWS or count > _MAX_VALUES or size > _MAX_TABLE:
+            with open(place, "rb") as plain:
+                footer = parquet_footer.read(path, plain)
+            if footer.rows > foreign.MAX_ROWS or footer.values > _MAX_VALUES or footer.bytes > _MAX_TABLE:
                 raise ValueError(
-                    f"{path}: has {about.num_rows} rows, {count} values and {size} bytes, "
+                    f"{path}: has {footer.rows} rows, {footer.values} values and {footer.bytes} bytes, "
                     f"the limits are {foreign.MAX_ROWS}, {_MAX_VALUES} and {_MAX_TABLE}"
                 )
             return self._tables.read_table(place, columns=columns)
@@ -370,7 +370,8 @@ class Feature:
             ]
             if not self._depth[0] + self._depth[2] > 0 or not self._depth[0] < self._depth[1]:
                 raise ValueError(
-                    f"{place}: depths from {self._depth[0]} to {self._depth[1]} m with a shift of {self._depth[2]} m, expected rising values above 0"
+                    f"{place}: depths from {self._depth[0]} to {self._depth[1]} m with a shift of {self._depth[2]} "
+                    "m, expected rising values above 0"
                 )
 
     def _image_shape(self, sizes: list[int]) -> tuple[int, int]:
@@ -501,7 +502,8 @@ class _Pose:
             raise ValueError(f"joints names {len(names)} joints, but {_STATE} has {size} numbers")
         if unknown := [name for name in names if name and name not in known]:
             raise UnknownNameError(
-                f"{scene} has no hinge or slide joint '{unknown[0]}', the name of a number of {_STATE}; joints (--joints) gives others, "
+                f"{scene} has no hinge or slide joint '{unknown[0]}', the name of a number of {_STATE}; joints "
+                "(--joints) gives others, "
                 f"of {', '.join(known)}"
             )
         self._from = [i for i, name in enumerate(names) if name]

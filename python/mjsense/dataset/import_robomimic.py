@@ -55,20 +55,21 @@ def import_robomimic(
     # end of options
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Writes a data set of robomimic, robosuite or LIBERO as a recording, which can be inspected, read, and replayed from its states.
+    """Writes a data set of robomimic, robosuite or LIBERO as a recording, which can be inspected, read, and replayed from its
+    states.
 
-    Row t of the recording has observation t and action t - 1, so the last action of a demonstration, whose result the file does not
-    contain, is left out. Demonstrations without rows are left out, with a warning. Demonstrations with equal models are in one ``house_N``
-    folder. Images that a file states to have the bottom row first, as LIBERO's do, are turned. The files of the models are read from
-    the folder of the data set and from ``assets``, and from nowhere else.
+    Row t of the recording has observation t and action t - 1, so the last action of a demonstration, whose result the file does
+    not contain, is left out. Demonstrations without rows are left out, with a warning. Demonstrations with equal models are in
+    one ``house_N`` folder. Images that a file states to have the bottom row first, as LIBERO's do, are turned. The files of the
+    models are read from the folder of the data set and from ``assets``, and from nowhere else.
 
     Args:
         file: HDF5 file with ``data/demo_i``.
         out: Folder to write. It must not exist, or be empty; after an error it is not written.
         episodes: Positions of demonstrations, in the order of their numbers; by default all.
         fps: Steps per second; by default as the file's ``env_args`` state, or 20, robosuite's default.
-        assets: Folder of the package ``robosuite`` or of LIBERO's assets, for models that name their meshes and textures; by default the
-            installed ``robosuite``.
+        assets: Folder of the package ``robosuite`` or of LIBERO's assets, for models that name their meshes and textures; by
+            default the installed ``robosuite``.
         model: Whether the models are imported, which replay needs.
 
         Options:
@@ -89,7 +90,8 @@ def import_robomimic(
 
     Raises:
         FileNotFoundError: A model names a file that does not exist in these folders.
-        ValueError: The file has no demonstrations, arrays of a demonstration have different lengths, or a model and its states do not fit.
+        ValueError: The file has no demonstrations, arrays of a demonstration have different lengths, or a model and its states do
+            not fit.
     """
     files = given_options("FilesCfg", locals())
     path = Path(file)
@@ -137,7 +139,8 @@ def _with_rows(path: Path, demos: list[_Demonstration]) -> list[_Demonstration]:
         raise ValueError(f"{path}: no demonstration has rows: {', '.join(empty[:10])}")
     if empty:
         warnings.warn(
-            f"{path}: {', '.join(empty[:10])} {'has' if len(empty) == 1 else 'have'} no rows, and {len(empty)} of {len(demos)} demonstrations "
+            f"{path}: {', '.join(empty[:10])} {'has' if len(empty) == 1 else 'have'} no rows, and {len(empty)} of "
+            f"{len(demos)} demonstrations "
             "are left out",
             stacklevel=4,
         )
@@ -367,7 +370,8 @@ class _Writer:
         for place in known.keys() | {place for place in demo.arrays if place.startswith("obs/")}:
             if place not in known or place not in demo.arrays:
                 raise ValueError(
-                    f"{demo.about}: {place} is {'missing' if place in known else 'not'} in {'this' if place in known else 'the first'} demonstration; "
+                    f"{demo.about}: {place} is {'missing' if place in known else 'not'} in "
+                    f"{'this' if place in known else 'the first'} demonstration; "
                     "expected the same observations in all"
                 )
             size = known[place][0].size

@@ -36,7 +36,8 @@ class Rows(WrittenRows):
     """The streams of a recording with one world."""
 
     def add_state(self, model: mujoco.MjModel) -> np.ndarray:
-        """Declares the data for replay. Returns the array ``[1, nstate]`` to write MuJoCo's states to, in the order of mjSTATE_INTEGRATION."""
+        """Declares the data for replay. Returns the array ``[1, nstate]`` to write MuJoCo's states to, in the order of
+        mjSTATE_INTEGRATION."""
         size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_INTEGRATION)
         state = self.add(
             "replay/state", "float64", (size,), "MuJoCo's state, in the order of mjSTATE_INTEGRATION.", frame="world"
@@ -55,7 +56,8 @@ def archive_of(text: str, read: Callable[[str, str], tuple[str, bytes]], about: 
 
     Args:
         text: The model as MJCF.
-        read: Name in the archive and content of a file, given its name in the MJCF and the folder that the MJCF states for its kind.
+        read: Name in the archive and content of a file, given its name in the MJCF and the folder that the MJCF states for its
+            kind.
         about: The file with the model, for errors.
     """
     from xml.etree import ElementTree  # slow to import

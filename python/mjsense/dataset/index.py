@@ -34,10 +34,13 @@ def rows_of(path: Path) -> list[dict[str, Any]]:
     rows: list[dict[str, Any]] = []
     with open_plain(path) as plain:
         try:
-            if other := parquet_footer.codecs(path, plain) - set(_PACKED):
+            footer = parquet_footer.read(path, plain)
+            if footer.rows > EPISODES:
+                raise ValueError(f"{path} has {footer.rows} rows, more than {EPISODES}")
+            if other := footer.codecs - set(_PACKED):
                 raise ValueError(f"{path} is packed with {min(other)}; it must be {' or '.join(_PACKED)}")
             plain.seek(0)
-            _check_columns(path, parquet.ParquetFile(arrow.PythonFile(plain, "r")))
+            _check_columns(path, parquet.ParquetFile(arrow.PythonFile(plain, "r")).schema_arrow)
             # Dictionaries of texts: a text that occurs in many rows is not copied for each of them.
             file = parquet.ParquetFile(arrow.PythonFile(plain, "r"), read_dictionary=list(_TEXTS))
             for batch in file.iter_batches(_ROWS, columns=[*_TEXTS, *_NUMBERS, "success"]):
@@ -48,8 +51,7 @@ def rows_of(path: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def _check_columns(path: Path, file: Any) -> None:
-    metadata, schema = file.metadata, file.schema_arrow
+def _check_columns(path: Path, schema: Any) -> None:
     types = {field.name: str(getattr(field.type, "value_type", field.type)) for field in schema}
     expected = {**dict.fromkeys(_TEXTS, ("string",)), **dict.fromkeys(_NUMBERS, ("int64", "uint64")), "success": ("bool",)}
     for name, kinds in expected.items():
@@ -57,8 +59,6 @@ def _check_columns(path: Path, file: Any) -> None:
             raise ValueError(
                 f"{path}: the column '{name}' is {printable(types.get(name, 'missing')[:100])}; it must be {' or '.join(kinds)}"
             )
-    if metadata.num_rows > EPISODES:
-        raise ValueError(f"{path} has {metadata.num_rows} rows, more than {EPISODES}")
 
 
 def _check_texts(path: Path, batch: Any) -> None:

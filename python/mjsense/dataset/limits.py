@@ -11,7 +11,8 @@ SCENE_BYTES = 1 << 24
 TEXT_BYTES = 1 << 16
 """Any other text: an outcome, a description of a stream."""
 JSON_DEPTH = 60
-"""Nesting of JSON values; readers recurse once for each level. The C++ reader has 64: a rendering puts the description of its source into its own."""
+"""Nesting of JSON values; readers recurse once for each level. The C++ reader has 64: a rendering puts the description of its
+source into its own."""
 JSON_VALUES = 200_000
 """Values in one JSON text. The longest text that was recorded, with 100 objects, has 3,000."""
 JSON_ROW_BYTES = 1 << 20

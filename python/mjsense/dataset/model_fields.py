@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Values that an episode writes into the archived model and its state, checked against what they change and index.
 
-MuJoCo uses most integers of a model as addresses in memory and checks none of them. A recording may come from anyone, so only fields that
-may differ between worlds are taken, with the shape and the type that they have in the model, finite, and with ids of elements that exist.
+MuJoCo uses most integers of a model as addresses in memory and checks none of them. A recording may come from anyone, so only
+fields that may differ between worlds are taken, with the shape and the type that they have in the model, finite, and with ids of
+elements that exist.
 """
 
 from __future__ import annotations
@@ -65,7 +66,8 @@ _RANGES = {
 }
 """Whether something is limited, and to what."""
 _BOXES = "bvh_aabb"
-"""The boxes of bodies contain objects that are larger in an episode. Of the others, which fields name as structure, this is the only one."""
+"""The boxes of bodies contain objects that are larger in an episode. Of the others, which fields name as structure, this is the
+only one."""
 
 
 @dataclass(frozen=True)
@@ -155,8 +157,8 @@ INPUTS = {
     "mocap": ("float64", 4, False),
     "held": ("int32", 1, False),
 }
-"""Arrays of ``replay/``: type, number of dimensions, and whether NaN has a meaning. All but ``held`` have a row per observation; no step led to
-row 0, whose controls and poses have none."""
+"""Arrays of ``replay/``: type, number of dimensions, and whether NaN has a meaning. All but ``held`` have a row per observation;
+no step led to row 0, whose controls and poses have none."""
 
 
 def read_input(group: Mapping[str, Any], name: str, length: int, about: str) -> Any:

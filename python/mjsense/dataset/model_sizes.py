@@ -17,13 +17,14 @@ MAX_PIXELS = 1 << 30  # bytes of all textures and height fields; 300 textures of
 MAX_ELEMENTS = 300_000
 """After ``replicate`` and ``composite``."""
 MAX_COPIES, MAX_COPIES_WITH_SENSORS = 4000, 8
-"""By ``replicate``. MuJoCo 4.0.1 needs time that grows with their square and, with some sensors, doubles with each copy. It writes models without
-``replicate``, so that recordings have none."""
+"""By ``replicate``. MuJoCo 4.0.1 needs time that grows with their square and, with some sensors, doubles with each copy. It
+writes models without ``replicate``, so that recordings have none."""
 MAX_NUMBERS = 50_000_000
 """Numbers of sparse matrices, keyframes, histories, user data and tables."""
 MAX_SUBSTEPS = 100_000
 MAX_LENGTH_WORK = 300_000_000
-"""Elements x steps that the compiler simulates to find the ranges of muscles. 80 muscles in a model of 500 elements take a quarter of it."""
+"""Elements x steps that the compiler simulates to find the ranges of muscles. 80 muscles in a model of 500 elements take a
+quarter of it."""
 
 _FACTORS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40, "P": 1 << 50, "E": 1 << 60}
 _DOFS = {"free": 6, "ball": 3}
@@ -198,7 +199,8 @@ class _Sizes:
                 )
 
     def _tree(self, element: Element, copies: int, above: int) -> int:
-        """Counts the elements below, each ``copies`` times, and the numbers of the inertia matrix. Returns the degrees of freedom.
+        """Counts the elements below, each ``copies`` times, and the numbers of the inertia matrix. Returns the degrees of
+        freedom.
 
         ``above``: degrees of freedom between the world and the element.
         """

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 else:
     mujoco = libmujoco.shared
 
-# Element lists of mjSpec by the prefix of their fields in mjModel. Fields and attributes have the same names, except those in _RENAMED.
+# Element lists of mjSpec by the prefix of their fields in mjModel. Fields and attributes have the same names, except those in
+# _RENAMED.
 _ELEMENTS = {
     "body": "bodies",
     "geom": "geoms",
@@ -60,7 +61,8 @@ _MESH = int(mujoco.mjtGeom.mjGEOM_MESH) if mujoco else -1
 
 
 def _write_mesh_geom(geom: Any, model: mujoco.MjModel) -> None:
-    """The mesh, and the pose relative to it: the compiler moves a mesh to its principal axes of inertia and adds that to the geom's pose."""
+    """The mesh, and the pose relative to it: the compiler moves a mesh to its principal axes of inertia and adds that to the
+    geom's pose."""
     mesh = int(model.geom_dataid[geom.id])
     geom.meshname = model.mesh(mesh).name
     inverse, quat, offset = np.empty(4), np.empty(4), np.empty(3)
@@ -71,7 +73,8 @@ def _write_mesh_geom(geom: Any, model: mujoco.MjModel) -> None:
 
 
 def model_xml(episode: Episode) -> tuple[str, dict[str, bytes]]:
-    """MJCF of the episode's model and the files that it names. MuJoCo compiles it to the model of the episode, except for rounding.
+    """MJCF of the episode's model and the files that it names. MuJoCo compiles it to the model of the episode, except for
+    rounding.
 
     Raises:
         ValueError: The recording has no data for replay, or a changed field of the model cannot be written as MJCF.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The compression of a Parquet file's columns, read from its footer.
+"""What the footer of a Parquet file says about its size and compression.
 
 pyarrow 26 ends the process, instead of raising an error, when it returns a column of a damaged footer. Format:
 https://github.com/apache/parquet-format, and the compact protocol of Apache Thrift.
@@ -8,17 +8,30 @@ https://github.com/apache/parquet-format, and the compact protocol of Apache Thr
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
 _FOOTER_BYTES = 1 << 26
 _MAX_DEPTH = 32
-_ROW_GROUPS, _COLUMNS, _ABOUT, _CODEC = 4, 1, 3, 4  # fields of FileMetaData, RowGroup, ColumnChunk, ColumnMetaData
+# Fields of FileMetaData, RowGroup, ColumnChunk and ColumnMetaData.
+_NUM_ROWS, _ROW_GROUPS, _COLUMNS, _TOTAL_BYTE_SIZE, _META_DATA, _CODEC, _NUM_VALUES = 3, 4, 1, 2, 3, 4, 5
 _CODECS = ("UNCOMPRESSED", "SNAPPY", "GZIP", "LZO", "BROTLI", "LZ4", "ZSTD", "LZ4_RAW")
 
 
-def codecs(path: Path, file: BinaryIO) -> set[str]:
-    """Names of the codecs of all columns. ``path`` is for errors.
+@dataclass(frozen=True)
+class Footer:
+    """The sums over all row groups and columns."""
+
+    rows: int
+    values: int
+    bytes: int
+    """Of the unpacked columns."""
+    codecs: frozenset[str]
+
+
+def read(path: Path, file: BinaryIO) -> Footer:
+    """The footer of a file that is open at any position. ``path`` is for errors.
 
     Raises:
         ValueError: The footer is damaged.
@@ -31,12 +44,15 @@ def codecs(path: Path, file: BinaryIO) -> set[str]:
             raise ValueError
         file.seek(size - 8 - length)
         table = _Reader(file.read(length)).fields(0)
-        found = {column[_ABOUT][_CODEC] for group in table[_ROW_GROUPS] for column in group[_COLUMNS]}
-        if min(found, default=0) < 0:
+        groups = table[_ROW_GROUPS]
+        columns = [column[_META_DATA] for group in groups for column in group[_COLUMNS]]
+        values, sizes = [column[_NUM_VALUES] for column in columns], [group[_TOTAL_BYTE_SIZE] for group in groups]
+        codecs = {column[_CODEC] for column in columns}
+        if min(table[_NUM_ROWS], *values, *sizes, *codecs, 0) < 0:
             raise ValueError
-        return {_CODECS[codec] for codec in found}
+        return Footer(table[_NUM_ROWS], sum(values), sum(sizes), frozenset(_CODECS[codec] for codec in codecs))
     except (ValueError, TypeError, LookupError, struct.error):
-        raise ValueError(f"{path}: not an index that can be read: its footer is damaged") from None
+        raise ValueError(f"{path}: not a Parquet file that can be read: its footer is damaged") from None
 
 
 class _Reader:

@@ -16,7 +16,8 @@ _KINDS = ((stat.S_ISFIFO, "a pipe"), (stat.S_ISSOCK, "a socket"))
 
 
 def is_plain_name(name: str) -> bool:
-    """Whether this is a file name without a folder: not empty, without a separator and control characters, and not ``.`` or ``..``."""
+    """Whether this is a file name without a folder: not empty, without a separator and control characters, and not ``.`` or
+    ``..``."""
     if not name or name in (".", "..") or "/" in name or len(name) > NAME_BYTES:
         return False
     return (

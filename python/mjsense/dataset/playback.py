@@ -39,7 +39,8 @@ def inputs_of(episode: EpisodeRows) -> ReplayInputs:
         group = file[episode.trajectory].get("replay")
         if group is None and "env" in episode.settings:
             raise ValueError(
-                f"{where(episode)} has no data for replay: the environment '{episode.settings['env']}' is not simulated by mjsense"
+                f"{where(episode)} has no data for replay: the environment '{episode.settings['env']}' is not "
+                "simulated by mjsense"
             )
         if group is None:
             raise ValueError(
@@ -109,7 +110,8 @@ def check_unchanged(episode: EpisodeRows) -> None:
         names = "" if dataset is None else dataset.text()
     if names:
         raise ValueError(
-            f"{where(episode)} cannot be simulated from its actions: {', '.join(names.split())} of the model changed during the episode, and the "
+            f"{where(episode)} cannot be simulated from its actions: {', '.join(names.split())} of the model "
+            "changed during the episode, and the "
             "recording has the values at its end"
         )
 
@@ -141,7 +143,8 @@ def fields_of(episode: EpisodeRows, model: mujoco.MjModel, prefix: str = "") -> 
 
 
 def check_episode(episode: EpisodeRows) -> None:
-    """Raises ValueError, with one line, for an episode whose archive or data for replay would be refused by replay, render or the viewer.
+    """Raises ValueError, with one line, for an episode whose archive or data for replay would be refused by replay, render or the
+    viewer.
 
     Without the package ``mujoco`` the archive and the arrays are checked, but not the values of the model's fields.
     """

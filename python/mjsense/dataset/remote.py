@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings at addresses of fsspec, such as ``s3://bucket/pick``: their files are copied to a local folder when they are first read."""
+"""Recordings at addresses of fsspec, such as ``s3://bucket/pick``: their files are copied to a local folder when they are first
+read."""
 
 from __future__ import annotations
 
@@ -70,7 +71,8 @@ def _below(folder: str, key: str, address: str) -> str:
     name = key[len(folder) + 1 :]
     if not key.startswith(f"{folder}/") or not all(map(is_plain_name, name.split("/"))):
         raise ValueError(
-            f"{address}: the object '{printable(key[-200:])}' is not named as a file of the folder '{printable(folder[-200:])}'; nothing was copied"
+            f"{address}: the object '{printable(key[-200:])}' is not named as a file of the folder "
+            f"'{printable(folder[-200:])}'; nothing was copied"
         )
     return name
 
@@ -78,8 +80,8 @@ def _below(folder: str, key: str, address: str) -> str:
 def resolved(root: str | Path) -> tuple[Path, Remote | None]:
     """The local folder or file of a recording: of an index the folder that contains it, of an address the local copy.
 
-    Of a recording with an index, only the index is copied here, and the folders of episodes when they are first read. Copies are in
-    ``$MJSENSE_CACHE``, by default ``~/.cache/mjsense``; a recording that has changed gets a new one.
+    Of a recording with an index, only the index is copied here, and the folders of episodes when they are first read. Copies are
+    in ``$MJSENSE_CACHE``, by default ``~/.cache/mjsense``; a recording that has changed gets a new one.
     """
     if not is_address(root):
         path = Path(root)

@@ -16,6 +16,7 @@ from mjsense.core.declared_fields import declared_fields
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.core.rotations import quaternions_of
 from mjsense.dataset.description import is_known_thing, printable
+from mjsense.dataset.episode_rows import VIDEOS
 from mjsense.dataset.hdf5 import open_h5
 from mjsense.dataset.playback import where
 from mjsense.sensors.configs import CameraSensorCfg
@@ -31,15 +32,15 @@ _DEFAULT_SIZE = (640, 480)
 
 @functools.cache
 def image_options() -> dict[str, str]:
-    """Fields of :class:`mjsense.CameraSensorCfg` by the option of a recording that sets them for all cameras, but for the size, which each
-    camera has. The camera's name of a switch begins with ``use_``."""
+    """Fields of :class:`mjsense.CameraSensorCfg` by the option of a recording that sets them for all cameras, but for the size,
+    which each camera has. The camera's name of a switch begins with ``use_``."""
     fields = declared_fields("CameraSensorCfg").keys() - {"width", "height"}
     return {name: field for name in declared_fields("ImageCfg") for field in (name, f"use_{name}") if field in fields}
 
 
 def recorded_images(settings: Mapping[str, Any], given: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Values of :func:`image_options`: those of `given` that are not None, otherwise of a recording with these settings. One that is older
-    than an option has its default.
+    """Values of :func:`image_options`: those of `given` that are not None, otherwise of a recording with these settings. One that
+    is older than an option has its default.
 
     Raises:
         ValueError: If the recording names a file as environment and `given` has none.
@@ -48,7 +49,8 @@ def recorded_images(settings: Mapping[str, Any], given: Mapping[str, Any] | None
     own = {name: given[name] for name in images if given and given.get(name) is not None}
     if "environment" not in own and shows_file({**images, **own}):
         raise ValueError(
-            f"environment '{printable(images['environment'][:100])}': the recording names a file, and files are not taken from a recording; "
+            f"environment '{printable(images['environment'][:100])}': the recording names a file, and files are not "
+            "taken from a recording; "
             "pass the option environment"
         )
     return {**images, **own}
@@ -191,7 +193,8 @@ class CameraSystem:
             raise ValueError(f"camera_system '{name}': {episode.path} was recorded without a robot; use add_cameras")
         if not is_known_thing(robot):
             raise ValueError(
-                f"camera_system '{name}': {episode.path} names the robot '{robot}', a file, which is not taken from a recording; use add_cameras"
+                f"camera_system '{name}': {episode.path} names the robot '{robot}', a file, which is not taken from "
+                "a recording; use add_cameras"
             )
         self._robot = _core.Robot(robot)
         self._system = _core.CameraSystem(name, self._robot.file, ROBOT_PREFIX, self._robot.base)
@@ -256,7 +259,7 @@ def choose(
     depth: bool | None,
     segmentation: bool | None,
 ) -> tuple[list[RenderCamera], CameraSystem | None, list[RenderCamera]]:
-    """The cameras in the order of the new recording, the camera system, and those cameras that are as recorded."""
+    """The cameras in the order of the new recording, the camera system, and those cameras whose videos are as recorded."""
     system = CameraSystem(camera_system, episode) if camera_system else None
     if cameras is None and system is not None:
         cameras = []
@@ -276,4 +279,5 @@ def choose(
     twice = {name for name in names if names.count(name) > 1}
     if twice:
         raise ValueError(f"two cameras are named '{sorted(twice)[0]}'; a camera that is added needs a new name")
-    return chosen, system, [camera for camera, before in zip(chosen, recorded) if camera == before]
+    unchanged = [camera for camera, before in zip(chosen, recorded) if camera == before]
+    return chosen, system, [camera for camera in unchanged if VIDEOS + camera.name in episode.streams]

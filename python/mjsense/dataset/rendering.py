@@ -275,6 +275,9 @@ def render(
     shading: Literal["classic", "pbr", "path"] | None = None,
     samples_per_pixel: int | None = None,
     exposure: float | None = None,
+    exposure_mode: Literal["fixed", "auto"] | None = None,
+    exposure_time_constant: float | None = None,
+    imager: Literal["none", "d435", "zed_mini"] | None = None,
     tone_mapping: Literal["neutral", "filmic", "linear", "agx"] | None = None,
     white_balance: float | None = None,
     environment: str | None = None,
@@ -302,18 +305,18 @@ def render(
 ) -> RenderSummary:
     """Renders recorded episodes again, with other or more cameras and sensors, into a new recording.
 
-    Every number of the old recording is carried over unchanged: actions, rewards, states, data for replay, ``obs_scene`` and outcomes.
-    Images and sensors are computed from the recorded states and the archived model; videos of recorded cameras that do not change are copied.
-    Nothing is simulated, and neither the task nor the policy is needed. Ctrl-C keeps the finished episodes; call again with
-    ``resume=True`` to continue.
+    Every number of the old recording is carried over unchanged: actions, rewards, states, data for replay, ``obs_scene`` and
+    outcomes. Images and sensors are computed from the recorded states and the archived model; videos of recorded cameras that do
+    not change are copied. Nothing is simulated, and neither the task nor the policy is needed. Ctrl-C keeps the finished
+    episodes; call again with ``resume=True`` to continue.
 
     Args:
         root: Folder of a recording, or a :class:`Dataset`.
         out: Output directory.
         cameras: Names of the recorded cameras to render; by default all, or none with ``camera_system``.
-        add_cameras: New cameras by name: a dict with ``pos`` (m) and either ``lookat`` (m) or ``quat`` (wxyz; x right, y up, looking
-            along -z), all in the frame of ``body`` (full name; by default the world); and optionally ``up``, ``fovy`` (degrees),
-            ``width``, ``height`` (pixels), ``depth`` and ``segmentation``.
+        add_cameras: New cameras by name: a dict with ``pos`` (m) and either ``lookat`` (m) or ``quat`` (wxyz; x right, y up,
+            looking along -z), all in the frame of ``body`` (full name; by default the world); and optionally ``up``, ``fovy``
+            (degrees), ``width``, ``height`` (pixels), ``depth`` and ``segmentation``.
         camera_system: Name or file of a camera system of the robot.
 
         Options:
@@ -334,12 +337,18 @@ def render(
         samples_per_pixel: Paths per pixel with shading path; four times as many halve the noise. ``samples`` and
             ``shadow_samples`` are for the other kinds of shading. By default as recorded.
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness. By default as recorded.
+        exposure_mode: auto: a meter chooses the exposure of each world, instead of ``exposure``. By default as
+            recorded.
+        exposure_time_constant: Time in which the automatic exposure covers 63 % of a change; 0: it follows at once. By
+            default as recorded. [s]
+        imager: Photon and read noise, vignetting and quantisation of the colour sensor of a real camera. By default as
+            recorded.
         tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
             clips; agx: bright colours become white. By default as recorded.
         white_balance: Colour temperature of the light that appears white. By default as recorded. [K]
         environment: Light from the surroundings. model: the model's image light, else studio; auto: its image light,
-            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr
-            file, which is also the background. By default as recorded.
+            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr or
+            .exr file, which is also the background. By default as recorded.
         environment_intensity: Factor of the light from the surroundings. By default as recorded.
         environment_rotation: Rotation of the surroundings about the world's z axis; a skybox in the background does not
             rotate. By default as recorded. [degrees]
@@ -361,14 +370,16 @@ def render(
         molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video. By default as
             recorded.
         Others:
-        edit: Function that edits the MjSpec before compilation: adds lights, replaces textures, hides geoms. Bodies, joints and geoms
-            must stay as they are.
-        sensors: Configurations of sensors, user-defined :class:`Sensor` objects, or sensors such as :class:`PoseSensor`; for a recording
-            with several houses, a function that makes them for each house. One with the name of a recorded stream replaces it.
-        copy: Copy the videos of recorded cameras of which no option changes the images. False: render them again, with the same result.
+        edit: Function that edits the MjSpec before compilation: adds lights, replaces textures, hides geoms. Bodies, joints and
+            geoms must stay as they are.
+        sensors: Configurations of sensors, user-defined :class:`Sensor` objects, or sensors such as :class:`PoseSensor`; for a
+            recording with several houses, a function that makes them for each house. One with the name of a recorded stream
+            replaces it.
+        copy: Copy the videos of recorded cameras of which no option changes the images. False: render them again, with the same
+            result.
         episodes: Positions of episodes in the recording; by default all.
-        progress: Show the progress on stderr, or a function that is called with it about ten times per second; by default shown where
-            stderr is a terminal or a notebook.
+        progress: Show the progress on stderr, or a function that is called with it about ten times per second; by default shown
+            where stderr is a terminal or a notebook.
     """
     options: dict[str, Any] = dict(locals())
     _core.check_options("RenderCfg", given_options("RenderCfg", {**options, "episodes": None}))
@@ -380,7 +391,8 @@ def render(
     given = () if callable(sensors) else list(sensors)
     if len(houses) > 1 and any(not hasattr(sensor, "kind") or isinstance(sensor, CoreSensor) for sensor in given):
         raise ValueError(
-            f"{dataset.root} has {len(houses)} houses: pass a function that makes the sensors, because each belongs to one simulation"
+            f"{dataset.root} has {len(houses)} houses: pass a function that makes the sensors, because each belongs "
+            "to one simulation"
         )
     if Path(out).resolve() in {dataset.root.resolve(), *(chosen[0].path.resolve().parents[1] for chosen in houses)}:
         raise ValueError(f"the output directory '{out}' is that of the recording; choose another one")

@@ -53,7 +53,8 @@ class EpisodeCheck:
     """Position in the recording."""
     steps: int
     stepwise: Deviation | None = None
-    """First deviation of the simulation if each step starts from the recorded state; None: equal bit for bit, or not simulated."""
+    """First deviation of the simulation if each step starts from the recorded state; None: equal bit for bit, or not
+    simulated."""
     open_loop: Deviation | None = None
     """The same if only the first state is set."""
     sensors: SensorCheck | None = None
@@ -192,11 +193,11 @@ def check_replay(
 
     Args:
         root: Folder of a recording, or a :class:`Dataset`.
-        actions: Simulate in plain MuJoCo (without the package ``mujoco``: in mjsense's own copy of it) with the recorded controls, stepwise from each recorded state and open loop from the first one,
-            and compare the states.
-        states: Build the recording's task again, repeat each step from the recorded state, and compare every stream, rewards and success.
-            Depth is compared bit for bit, rgb by its video, because the encoder makes equal files of equal images. Streams of the policy,
-            and others that cannot be computed, are listed with the reason.
+        actions: Simulate in plain MuJoCo (without the package ``mujoco``: in mjsense's own copy of it) with the recorded
+            controls, stepwise from each recorded state and open loop from the first one, and compare the states.
+        states: Build the recording's task again, repeat each step from the recorded state, and compare every stream, rewards and
+            success. Depth is compared bit for bit, rgb by its video, because the encoder makes equal files of equal images.
+            Streams of the policy, and others that cannot be computed, are listed with the reason.
         episodes: Positions of episodes in the recording; by default all.
         num_worlds: Number of episodes whose sensors are computed in parallel.
         threads: Number of threads that compute sensors; 0: one per available CPU.

@@ -59,8 +59,8 @@ class SensorCheck:
 
 
 class _Rebuilt:
-    """The worlds of the recording's task, rebuilt from its settings: they have all of its sensors but those of the policy. Each step is
-    simulated from the recorded state with the recorded controls, so that sensors with a memory are right, too."""
+    """The worlds of the recording's task, rebuilt from its settings: they have all of its sensors but those of the policy. Each
+    step is simulated from the recorded state with the recorded controls, so that sensors with a memory are right, too."""
 
     def __init__(self, episode: Episode, num_worlds: int, threads: int) -> None:
         settings = episode._recording.settings
@@ -132,7 +132,8 @@ class _Rebuilt:
 
 
 def _written(inputs: ReplayInputs, t: int) -> tuple[np.ndarray, np.ndarray | None, np.ndarray | None]:
-    """What was written before the step to observation ``t``: rows of the state, and of the controls and mocap poses by control tick."""
+    """What was written before the step to observation ``t``: rows of the state, and of the controls and mocap poses by control
+    tick."""
     ctrl, mocap = (None if rows is None else np.ascontiguousarray(rows[t]).ravel() for rows in (inputs.ctrl, inputs.mocap))
     return np.ascontiguousarray(inputs.written[t]), ctrl, mocap
 

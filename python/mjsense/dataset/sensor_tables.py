@@ -72,7 +72,8 @@ def _python_sensor(table: dict[str, Any], context: str) -> Any:
 
 
 def sensors_of(path: str | Path) -> list[Any]:
-    """Sensors of the scene. Names of elements are full names in the model (``robot_0/gripper/base``), or local names with ``entity``."""
+    """Sensors of the scene. Names of elements are full names in the model (``robot_0/gripper/base``), or local names with
+    ``entity``."""
     tables = read_toml(path).get("sensors")
     if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
         raise ValueError(f"{path}: contains no [[sensors]] tables")

@@ -54,7 +54,8 @@ def decoded(info: VideoInfo, pixels: np.ndarray) -> np.ndarray:
     """Values of a picture: uint8 [H, W, 3] of rgb, float32 [H, W] m of depth."""
     if not all(got in (stated, stated + stated % 2) for got, stated in zip(pixels.shape, (info.height, info.width))):
         raise RuntimeError(
-            f"{info.path}: a frame has {pixels.shape[1]} x {pixels.shape[0]} pixels, the recording states {info.width} x {info.height}"
+            f"{info.path}: a frame has {pixels.shape[1]} x {pixels.shape[0]} pixels, the recording states "
+            f"{info.width} x {info.height}"
         )
     pixels = pixels[: info.height, : info.width]  # odd sizes are stored with one column or row more
     if info.encoding == "rgb":
@@ -201,7 +202,8 @@ class Video:
         return self._info.path
 
     def check(self) -> None:
-        """Raises an error if the file is missing, is not a regular file, or differs from what was recorded: for a program that copies it."""
+        """Raises an error if the file is missing, is not a regular file, or differs from what was recorded: for a program that
+        copies it."""
         with open_plain(self.path) as file:
             check_sum(file, self._info.crc, str(self.path))
 

@@ -39,7 +39,8 @@ def to_array(frame: Any, pixel_format: str) -> np.ndarray:
     """The pixels of a decoded frame."""
     from av.video.reformatter import VideoReformatter  # pyright: ignore[reportMissingImports]
 
-    # A converter takes 0.1 ms to create, as long as it needs for an image of 300 x 300 pixels, so each thread keeps one for each size.
+    # A converter takes 0.1 ms to create, as long as it needs for an image of 300 x 300 pixels, so each thread keeps one for each
+    # size.
     key = str((frame.width, frame.height, frame.format.name, pixel_format))
     converter = vars(_converters).get(key) or vars(_converters).setdefault(key, VideoReformatter())
     # One thread: a copy of a converter in a forked process would wait for the others forever.
@@ -52,7 +53,8 @@ def container_format(path: Path) -> str:
 
 
 def check_sum(file: PlainFile, stated: str, what: str) -> None:
-    """Compares a file with its checksum, and goes to its start. An empty checksum is that of an older recording, which has none."""
+    """Compares a file with its checksum, and goes to its start. An empty checksum is that of an older recording, which has
+    none."""
     if stated:
         crc = 0
         while piece := file.read(1 << 20):
@@ -60,7 +62,8 @@ def check_sum(file: PlainFile, stated: str, what: str) -> None:
         file.seek(0)
         if f"{crc:08x}" != stated:
             raise RuntimeError(
-                f"{what} differs from what was recorded: its checksum is {crc:08x}, not {printable(stated[:20])}; `mjsense verify` lists what is damaged"
+                f"{what} differs from what was recorded: its checksum is {crc:08x}, not {printable(stated[:20])}; "
+                "`mjsense verify` lists what is damaged"
             )
 
 
@@ -89,8 +92,8 @@ def open_container(path: Path, crc: str = "", codecs: str = CODECS) -> Iterator[
 class Packets:
     """Where the packets of a video lie in its file, in the order of decoding.
 
-    Opening a video with a demuxer and seeking in it costs more than decoding ten frames of 128x96. Reading the table costs as much once;
-    a later sample reads only the bytes from the key frame to its frame.
+    Opening a video with a demuxer and seeking in it costs more than decoding ten frames of 128x96. Reading the table costs as
+    much once; a later sample reads only the bytes from the key frame to its frame.
     """
 
     def __init__(self, path: Path, fps: Fraction, frames: int, size: tuple[int, int], crc: str) -> None:
@@ -147,7 +150,8 @@ class Packets:
 
 
 class Decoder:
-    """A codec at a position of a video. It decodes in one thread: DataLoader's workers run in parallel, and a fork copies no threads."""
+    """A codec at a position of a video. It decodes in one thread: DataLoader's workers run in parallel, and a fork copies no
+    threads."""
 
     def __init__(self, packets: Packets) -> None:
         av = optional("av", "dataset", "Reading videos")

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Evaluation of policies: fixed episodes of a task are played and recorded, and their results are counted. Modules are imported when they
-are used."""
+"""Evaluation of policies: fixed episodes of a task are played and recorded, and their results are counted. Modules are imported
+when they are used."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from mjsense.evaluation.report import Results as Results
     from mjsense.evaluation.report import results as results
     from mjsense.evaluation.timing import Timed as Timed
+    from mjsense.evaluation.timing import wrap_policy as wrap_policy
     from mjsense.evaluation.varied import Sensitivity as Sensitivity
     from mjsense.evaluation.varied import sensitivity as sensitivity
 
@@ -38,6 +39,7 @@ _PLACES: dict[str, str] = {
     "policy_from": "policies",
     "results": "report",
     "sensitivity": "varied",
+    "wrap_policy": "timing",
 }
 """Module of each public name."""
 __all__ = [
@@ -55,6 +57,7 @@ __all__ = [
     "policy_from",
     "results",
     "sensitivity",
+    "wrap_policy",
 ]
 
 

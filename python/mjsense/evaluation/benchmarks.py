@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frozen benchmarks: a folder that fixes the episodes of an evaluation, so that it can be repeated elsewhere and later.
 
-``benchmark.json`` states the options of the recording, the numbers of the episodes, and the checksums of all files. ``starts/`` is a
-recording of the first observations of these episodes: their states, models, instructions and images. The episodes are sampled again
-when the benchmark is played, and refused unless they are equal to the stored ones, bit for bit. A folder is only data: it names things that
-mjsense contains, neither files nor code. The benchmarks of the package, such as ``benchmark:pick``, are one file each, with checksums of
-the starts instead of their recording.
+``benchmark.json`` states the options of the recording, the numbers of the episodes, and the checksums of all files. ``starts/``
+is a recording of the first observations of these episodes: their states, models, instructions and images. The episodes are
+sampled again when the benchmark is played, and refused unless they are equal to the stored ones, bit for bit. A folder is only
+data: it names things that mjsense contains, neither files nor code. The benchmarks of the package, such as ``benchmark:pick``,
+are one file each, with checksums of the starts instead of their recording.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ import inspect
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mjsense import _core
-from mjsense.core.errors import UnknownNameError, did_you_mean
+from mjsense.core.errors import UnknownNameError, did_you_mean, printable
 from mjsense.dataset import Dataset, Episode, bounded_json
 from mjsense.dataset.places import is_plain_name
 from mjsense.tasks.recording import record
@@ -31,6 +31,7 @@ from mjsense.tasks.vector import TaskVectorEnv, make_vec
 FILE, STARTS = "benchmark.json", "starts"
 PREFIX, _SHIPPED = "benchmark:", Path(__file__).parent / "shipped"
 _FORMAT = 1
+_SHOWN = 10  # houses in a message
 _FILE_BYTES = 1 << 24
 _MAX_EPISODES, _MAX_FILES, _MAX_DEPTH = 100_000, 1_000_000, 4
 _PARTS = ("task", "robot", "scene", "split", "arm_controller", "camera_system")
@@ -77,7 +78,11 @@ class Benchmark:
             raise FileNotFoundError(f"benchmark: '{self.folder}' has no {FILE}")
         with open(path, "rb") as file:
             text = file.read(_FILE_BYTES + 1)
-        table = bounded_json.parse_object(text, str(path), _FILE_BYTES)
+        table = bounded_json.parse(text, str(path), _FILE_BYTES)
+        if isinstance(table, list):
+            raise ValueError(f"{path} is a benchmark of MolmoSpaces, {_houses_of(table)}. mjsense does not contain these scenes")
+        if not isinstance(table, dict):
+            raise ValueError(f"{path} is {bounded_json.kind_of(table)}, not an object")
         if table.get("format") != _FORMAT:
             raise ValueError(f"{path}: format is {table.get('format')!r}; this version of mjsense reads {_FORMAT}")
         self.checksum = _checksum(table)
@@ -132,11 +137,29 @@ class Benchmark:
             for world, number in _started(env, self.episodes):
                 if difference := compare(env, world, stored[number]):
                     raise ValueError(
-                        f"benchmark '{self.folder}': episode {number} does not start as when the benchmark was made: {difference}. It was "
+                        f"benchmark '{self.folder}': episode {number} does not start as when the benchmark was "
+                        f"made: {difference}. It was "
                         f"made by mjsense {self.version}, and this is {_core.__version__}."  # pyright: ignore[reportAttributeAccessIssue]
                     )
         finally:
             env.close()
+
+
+def _houses_of(episodes: list[Any]) -> str:
+    """The scenes of MolmoSpaces' episodes: ``3 episodes in the houses 1, 5 of procthor-10k (val)``."""
+    houses: dict[str, set[int]] = {}
+    for episode in episodes:
+        about = episode if isinstance(episode, dict) else {}
+        name, split, house = about.get("scene_dataset"), about.get("data_split", "val"), about.get("house_index")
+        if isinstance(name, str) and isinstance(split, str) and type(house) is int:
+            houses.setdefault(printable(f"{name:.60} ({split:.20})"), set()).add(house)
+    texts = [f"{_first(map(str, sorted(numbers)), ', ')} of {name}" for name, numbers in sorted(houses.items())]
+    return f"{len(episodes)} episodes in the houses {_first(texts, '; ') or 'that it does not state'}"
+
+
+def _first(texts: Iterable[str], comma: str) -> str:
+    listed = list(texts)
+    return comma.join([*listed[:_SHOWN], *["..."] * (len(listed) > _SHOWN)])
 
 
 _DEFAULTS: dict[str, Any] = {
@@ -160,8 +183,8 @@ def create_benchmark(
         out: Folder, which must not exist.
         episodes: Number of episodes. Attempts whose start cannot be played are left out.
         progress: As in :func:`mjsense.record`.
-        options: Options of :func:`mjsense.evaluate` that affect the data, such as ``robot``, ``scene``, ``split``, ``seed``, ``cameras`` and
-            ``horizon``.
+        options: Options of :func:`mjsense.evaluate` that affect the data, such as ``robot``, ``scene``, ``split``, ``seed``,
+            ``cameras`` and ``horizon``.
     """
     folder = Path(out)
     if folder.exists():

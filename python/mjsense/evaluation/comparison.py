@@ -60,7 +60,8 @@ class Comparison:
 
     @property
     def p_value(self) -> float:
-        """McNemar's exact test: probability of so different results, or more different ones, of policies with equal success rates."""
+        """McNemar's exact test: probability of so different results, or more different ones, of policies with equal success
+        rates."""
         return mcnemar(self.only_a, self.only_b)
 
     def episodes_needed(self, difference: float) -> int:
@@ -77,7 +78,8 @@ class Comparison:
         ]
         lines += [
             f"B - A  {self.difference:+.1%} [{low:+.1%}, {high:+.1%}]   (95 % interval: paired bootstrap)",
-            f"only A succeeds in {self.only_a}, only B in {self.only_b} of {len(self.pairs)} episodes; McNemar's exact test: p = {self.p_value:.3g}",
+            f"only A succeeds in {self.only_a}, only B in {self.only_b} of {len(self.pairs)} episodes; McNemar's "
+            f"exact test: p = {self.p_value:.3g}",
         ]
         lines += [f"{self.left_out} episodes that only one of them has played are left out"] if self.left_out else []
         needed = ", ".join(f"{self.episodes_needed(one)} ({one:.0%})" for one in _NEEDED)
@@ -95,8 +97,8 @@ def compare(a: str | Path | Dataset, b: str | Path | Dataset, *, allow: Iterable
         allow: Names of settings that may differ, such as ``cameras``, in addition to the policy.
 
     Raises:
-        ValueError: The settings differ, failed episodes were not kept, no episode is in both, or an episode starts differently. The text
-            says which.
+        ValueError: The settings differ, failed episodes were not kept, no episode is in both, or an episode starts differently.
+            The text says which.
     """
     of_a, of_b = results(a), results(b)
     for one in (of_a, of_b):

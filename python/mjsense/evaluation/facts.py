@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What was evaluated, and how: the settings of a recording, and ``evaluation.json``, which an evaluation writes into its folder."""
+"""What was evaluated, and how: the settings of a recording, and ``evaluation.json``, which an evaluation writes into its
+folder."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Intervals and tests of success rates.
 
-The formulas: E. B. Wilson, Probable inference, JASA 22 (1927); Q. McNemar, Psychometrika 12 (1947), with the exact binomial distribution;
-D. G. Bonett and R. M. Price, Journal of Educational and Behavioral Statistics 37 (2012), for the two added pairs; R. J. Connor, Biometrics
-43 (1987), for the number of pairs.
+The formulas: E. B. Wilson, Probable inference, JASA 22 (1927); Q. McNemar, Psychometrika 12 (1947), with the exact binomial
+distribution; D. G. Bonett and R. M. Price, Journal of Educational and Behavioral Statistics 37 (2012), for the two added pairs;
+R. J. Connor, Biometrics 43 (1987), for the number of pairs.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ def mcnemar(only_a: int, only_b: int) -> float:
 def paired_difference(only_a: int, only_b: int, pairs: int, confidence: float = 0.95, seed: int = 0) -> tuple[float, float]:
     """Bootstrap interval of the success rate of B minus that of A, over episodes that both play.
 
-    One pair for each policy is added before the episodes are drawn again. Without them, an interval of few or no different pairs is too short.
+    One pair for each policy is added before the episodes are drawn again. Without them, an interval of few or no different pairs
+    is too short.
     """
     counts = np.array([only_b + 1, only_a + 1, pairs - only_a - only_b], float)
     total = pairs + 2

@@ -117,8 +117,10 @@ class Features:
             given, taken = self._specs[name], self._specs.get(_COMMANDS + group, self._specs[name])
             if (given.unit, tuple(given.shape)) != (taken.unit, tuple(taken.shape)):
                 raise ValueError(
-                    f"feature 'action': it has '{name}' ({given.shape[0]} numbers, {given.unit}), but the controller of '{group}' takes "
-                    f"{taken.shape[0]} numbers ({taken.unit}). Choose the controller with arm_controller, or other streams in the map"
+                    f"feature 'action': it has '{name}' ({given.shape[0]} numbers, {given.unit}), but the "
+                    f"controller of '{group}' takes "
+                    f"{taken.shape[0]} numbers ({taken.unit}). Choose the controller with arm_controller, or other "
+                    "streams in the map"
                 )
             columns += range(self._groups[group].start, self._groups[group].stop)
         return np.array(columns, int)

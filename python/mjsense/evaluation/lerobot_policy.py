@@ -30,12 +30,12 @@ _FILE_BYTES = 1 << 24
 class LeRobotPolicy(Policy):
     """A checkpoint that was trained on a data set of :func:`mjsense.exporting.export_lerobot`.
 
-    It observes what the export contains: ``observation.state``, ``observation.images.NAME`` of the camera ``NAME``, the other features of
-    the map, and the instruction as ``task``. Its actions are commands of the move groups.
+    It observes what the export contains: ``observation.state``, ``observation.images.NAME`` of the camera ``NAME``, the other
+    features of the map, and the instruction as ``task``. Its actions are commands of the move groups.
 
-    Policies whose actions depend on one observation are called for all worlds that need a chunk, and ``n_action_steps`` of its actions are
-    executed. Policies that remember observations or actions are called at every step, with a memory for each world. Of kinds that are not
-    known to mjsense, one world can be played.
+    Policies whose actions depend on one observation are called for all worlds that need a chunk, and ``n_action_steps`` of its
+    actions are executed. Policies that remember observations or actions are called at every step, with a memory for each world.
+    Of kinds that are not known to mjsense, one world can be played.
 
     Weights are read from safetensors files, and the steps of the processors are those that LeRobot has registered: a checkpoint
     contains no code.
@@ -98,7 +98,8 @@ class LeRobotPolicy(Policy):
             if feature.startswith(IMAGES) and (here[2], here[0], here[1]) != shape:
                 height, width = shape[1:]
                 raise ValueError(
-                    f"{self._owner} was trained with images of {width}x{height} as '{feature}', and here they have {here[1]}x{here[0]} "
+                    f"{self._owner} was trained with images of {width}x{height} as '{feature}', and here they have "
+                    f"{here[1]}x{here[0]} "
                     f"pixels; render them with width={width}, height={height} (--width {width} --height {height})"
                 )
             if not feature.startswith(IMAGES) and here != shape:
@@ -209,7 +210,8 @@ class LeRobotPolicy(Policy):
             for step in steps if isinstance(steps, list) else [steps]:
                 if not isinstance(step, dict) or not isinstance(step.get("registry_name"), str):
                     raise ValueError(
-                        f"{path}: a step of the processor is {str(step)[:200]}; expected one with a registry_name: steps by the name of a "
+                        f"{path}: a step of the processor is {str(step)[:200]}; expected one with a registry_name: "
+                        "steps by the name of a "
                         "class are refused, because they can run any code"
                     )
 
@@ -247,6 +249,7 @@ def _needed(module: str, package: str) -> Any:
         return importlib.import_module(module)
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(
-            f"a policy lerobot:DIR needs the package {package} (LeRobot 0.4.4 or newer, pip install lerobot) in this Python's environment: {error}",
+            f"a policy lerobot:DIR needs the package {package} (LeRobot 0.4.4 or newer, pip install lerobot) in "
+            f"this Python's environment: {error}",
             name=error.name,
         ) from error

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report of an evaluation as one HTML file, without scripts and with its images inside. Every text of a recording is escaped."""
+"""The report of an evaluation as one HTML file, without scripts and with its images inside. Every text of a recording is
+escaped."""
 
 from __future__ import annotations
 
@@ -25,15 +26,22 @@ _LISTED = 1000  # episodes in the table of all
 _GROUPS = 100  # rows of a table of groups
 
 _STYLE = """
-:root { color-scheme: light dark; --text: #1d2430; --soft: #5d6675; --line: #d8dde5; --bar: #2f7d5b; --band: #2f7d5b33; --page: #fff; --bad: #a4312a }
-@media (prefers-color-scheme: dark) { :root { --text: #e4e8ee; --soft: #9aa4b2; --line: #39414d; --bar: #5cc296; --band: #5cc29633; --page: #14181e; --bad: #f08b83 } }
-body { font: 15px/1.5 system-ui, sans-serif; color: var(--text); background: var(--page); max-width: 68rem; margin: 2rem auto; padding: 0 1rem }
+:root { color-scheme: light dark; --text: #1d2430; --soft: #5d6675; --line: #d8dde5; --bar: #2f7d5b; --band: #2f7d5b33;
+  --page: #fff; --bad: #a4312a }
+@media (prefers-color-scheme: dark) { :root { --text: #e4e8ee; --soft: #9aa4b2; --line: #39414d; --bar: #5cc296;
+  --band: #5cc29633; --page: #14181e; --bad: #f08b83 } }
+body { font: 15px/1.5 system-ui, sans-serif; color: var(--text); background: var(--page); max-width: 68rem; margin: 2rem auto;
+  padding: 0 1rem }
 h1 { font-size: 1.5rem; margin: 0 } h2 { font-size: 1.1rem; margin: 2rem 0 .5rem }
-.rate { font-size: 2.6rem; font-weight: 600; line-height: 1.2; margin: .8rem 0 0 } .rate + p { margin-top: 0 } .soft, th { color: var(--soft); font-weight: 400 }
+.rate { font-size: 2.6rem; font-weight: 600; line-height: 1.2; margin: .8rem 0 0 } .rate + p { margin-top: 0 }
+  .soft, th { color: var(--soft); font-weight: 400 }
 .warning { border-left: 4px solid var(--bad); padding: .3rem .8rem; margin: 1rem 0 }
-table { border-collapse: collapse } td, th { text-align: left; padding: .15rem 1.2rem .15rem 0; vertical-align: top; overflow-wrap: anywhere }
-td.number, th.number { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums } tbody tr { border-top: 1px solid var(--line) }
-.scroll { overflow-x: auto; font-size: .85rem } svg { display: block; max-width: 100% } svg text { fill: var(--soft); font-size: 12px }
+table { border-collapse: collapse } td, th { text-align: left; padding: .15rem 1.2rem .15rem 0; vertical-align: top;
+  overflow-wrap: anywhere }
+td.number, th.number { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums }
+  tbody tr { border-top: 1px solid var(--line) }
+.scroll { overflow-x: auto; font-size: .85rem } svg { display: block; max-width: 100% } svg text { fill: var(--soft);
+  font-size: 12px }
 figure { margin: 1rem 0 } figure img { display: block; max-width: 100%; margin-top: 2px } figcaption { margin-bottom: .2rem }
 summary { cursor: pointer; margin-top: 2rem } .bad { color: var(--bad) }
 """
@@ -46,7 +54,8 @@ def page_of(dataset: Dataset, rows: Sequence[Row], facts: Sequence[tuple[str, st
         (
             '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">',
             # Nothing is fetched or executed, even if a text were not escaped.
-            "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">",
+            "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; "
+            'img-src data:">',
             '<meta name="viewport" content="width=device-width">',
             f"<title>{escaped(title)}</title><style>{_STYLE}</style></head><body>",
             f"<h1>{escaped(title)}</h1>",
@@ -98,8 +107,11 @@ def _curve(rows: Sequence[Row], fps: float) -> str:
     def points(shares: np.ndarray) -> list[str]:
         return [f"{x(t):.1f},{y(s):.1f}" for t, s in zip(at, shares)]
 
-    marks = [f'<line x1="{left}" x2="{width - 10}" y1="{y(s):.1f}" y2="{y(s):.1f}" stroke="var(--line)"/>'
-             f'<text x="{left - 6}" y="{y(s) + 4:.1f}" text-anchor="end">{s:.0%}</text>' for s in (0, 0.25, 0.5, 0.75, 1)]  # fmt: skip
+    marks = [
+        f'<line x1="{left}" x2="{width - 10}" y1="{y(s):.1f}" y2="{y(s):.1f}" stroke="var(--line)"/>'
+        f'<text x="{left - 6}" y="{y(s) + 4:.1f}" text-anchor="end">{s:.0%}</text>'
+        for s in (0, 0.25, 0.5, 0.75, 1)
+    ]
     marks += [f'<text x="{x(t):.1f}" y="{height - bottom + 18}" text-anchor="middle">{t:g}</text>' for t in _ticks(end)]
     return (
         f'<h2>Success over time</h2><svg viewBox="0 0 {width} {height}" width="{width}" role="img" '
@@ -176,7 +188,10 @@ def _strips(episode: Episode) -> Iterator[str]:
             continue
         source = base64.b64encode(png_of(np.ascontiguousarray(np.concatenate(images, 1)))).decode("ascii")
         steps = ", ".join(map(str, rows))
-        yield f'<img alt="{escaped(name)}, steps {steps}" title="{escaped(name)}, steps {steps}" src="data:image/png;base64,{source}">'
+        yield (
+            f'<img alt="{escaped(name)}, steps {steps}" title="{escaped(name)}, steps {steps}" '
+            f'src="data:image/png;base64,{source}">'
+        )
 
 
 def _small(image: np.ndarray) -> np.ndarray:
@@ -187,8 +202,17 @@ def _small(image: np.ndarray) -> np.ndarray:
     return np.pad(pixels, ((0, 0), (0, 2), (0, 0)), constant_values=255)
 
 
-_COLUMNS = {"episode": "episode", "success": "result", "object": "object", "instruction": "instruction", "time_to_success_s": "success after, s",
-            "steps": "steps", "retries": "retries", "jerk": "jerk, m/s³", "latency_s": "latency, s"}  # fmt: skip
+_COLUMNS = {
+    "episode": "episode",
+    "success": "result",
+    "object": "object",
+    "instruction": "instruction",
+    "time_to_success_s": "success after, s",
+    "steps": "steps",
+    "retries": "retries",
+    "jerk": "jerk, m/s³",
+    "latency_s": "latency, s",
+}
 
 
 def _episodes(rows: Sequence[Row]) -> str:

@@ -18,7 +18,7 @@ from mjsense.evaluation.facts import FILE
 from mjsense.evaluation.policies import policy_from
 from mjsense.evaluation.replayed import ReplayedPolicy
 from mjsense.evaluation.report import Results, require_parquet, results
-from mjsense.evaluation.timing import Latency, Timed
+from mjsense.evaluation.timing import Latency, timed
 from mjsense.tasks.code_checksums import checksums
 from mjsense.tasks.parts import Robots, Scenes, Tasks
 from mjsense.tasks.policy import Policy
@@ -58,7 +58,10 @@ def evaluate(
     shading: Literal["classic", "pbr", "path"] = "classic",
     samples_per_pixel: int = 64,
     exposure: float = 8.0,
-    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "neutral",
+    exposure_mode: Literal["fixed", "auto"] = "fixed",
+    exposure_time_constant: float = 0.5,
+    imager: Literal["none", "d435", "zed_mini"] = "none",
+    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "filmic",
     white_balance: float = 6504.0,
     environment: str = "model",
     environment_intensity: float = 1.0,
@@ -83,6 +86,7 @@ def evaluate(
     keyint: int = 20,
     molmospaces_depth: bool = False,
     replay: bool = True,
+    videos: bool = True,
     # end of options
     sensors: Iterable[Any] = (),
     ray: str | None = None,
@@ -90,28 +94,29 @@ def evaluate(
 ) -> Results:
     """Plays episodes of a task with a policy, each once, and returns their results.
 
-    Every episode is recorded into ``out/house_<house>/``, failed ones too, as :func:`mjsense.record` does: it can be viewed, replayed and
-    exported. ``out/results.parquet`` and ``out/report.html`` are the results, and ``out/evaluation.json`` says what was evaluated. There is
-    no action noise. The starts depend only on the seed and the number of the episode, and so do the results of a policy that is a
-    function of its observations. An interrupted evaluation continues with ``resume=True``.
+    Every episode is recorded into ``out/house_<house>/``, failed ones too, as :func:`mjsense.record` does: it can be viewed,
+    replayed and exported. ``out/results.parquet`` and ``out/report.html`` are the results, and ``out/evaluation.json`` says what
+    was evaluated. There is no action noise. The starts depend only on the seed and the number of the episode, and so do the
+    results of a policy that is a function of its observations. An interrupted evaluation continues with ``resume=True``.
 
     Args:
-        task: A :class:`Task`, its class, a registered name (:func:`task_names`), or a benchmark, which fixes all options that affect the
+        task: A :class:`Task`, its class, a registered name (:func:`task_names`), or a benchmark, which fixes all options that
+            affect the
             data: its folder, or ``benchmark:pick`` and similar, which the package contains.
         robot: A registered name (:func:`robot_names`), the path of a ``.toml``, or a :class:`Robot`; by default the task's robot.
-        policy: A :class:`Policy`, a class or object with ``act`` (:class:`mjsense.evaluation.BatchedPolicy`), a function ``obs -> actions``, or
-            a text: a registered name (:func:`policy_names`), ``random``, ``replay:DIR``, ``lerobot:DIR``, ``python:MODULE:CLASS`` or
-            ``FILE.py:CLASS``.
+        policy: A :class:`Policy`, a class or object with ``act`` (:class:`mjsense.evaluation.BatchedPolicy`), a function
+            ``obs -> actions``, or a text: a registered name (:func:`policy_names`), ``random``, ``replay:DIR``, ``lerobot:DIR``,
+            ``python:MODULE:CLASS`` or ``FILE.py:CLASS``.
         out: Output directory.
         episodes: Number of episodes, which are then those from 0 on, or a list of their numbers. A benchmark states them itself.
         scene: A name, a file, a :class:`SceneFileCfg`, or a function that returns a :class:`SceneCfg`; by default the task's
             scene.
         policy_options: Arguments of the policy's class.
         execution_horizon: Number of actions of a chunk that are executed before the policy is called again; by default all.
-        ensemble: The executed action is the mean of all chunks that have one for the step, with the weights ``exp(-ensemble * i)``, ``i = 0``
-            for the oldest; by default that of the newest chunk.
-        latency: Time from an observation until the actions that answer it are executed, rounded up to control steps; ``measured``: the
-            wall-clock time that the policy needs for all worlds, with which results vary. [s]
+        ensemble: The executed action is the mean of all chunks that have one for the step, with the weights
+            ``exp(-ensemble * i)``, ``i = 0`` for the oldest; by default that of the newest chunk.
+        latency: Time from an observation until the actions that answer it are executed, rounded up to control steps;
+            ``measured``: the wall-clock time that the policy needs for all worlds, with which results vary. [s]
 
         Options:
         arm_controller: Controller of the robot's arms, which decides what an action is: its kind, for example
@@ -138,12 +143,15 @@ def evaluate(
         samples_per_pixel: Paths per pixel with shading path; four times as many halve the noise. ``samples`` and
             ``shadow_samples`` are for the other kinds of shading.
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness.
+        exposure_mode: auto: a meter chooses the exposure of each world, instead of ``exposure``.
+        exposure_time_constant: Time in which the automatic exposure covers 63 % of a change; 0: it follows at once. [s]
+        imager: Photon and read noise, vignetting and quantisation of the colour sensor of a real camera.
         tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
             clips; agx: bright colours become white.
         white_balance: Colour temperature of the light that appears white. [K]
         environment: Light from the surroundings. model: the model's image light, else studio; auto: its image light,
-            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr
-            file, which is also the background.
+            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr or
+            .exr file, which is also the background.
         environment_intensity: Factor of the light from the surroundings.
         environment_rotation: Rotation of the surroundings about the world's z axis; a skybox in the background does not
             rotate. [degrees]
@@ -175,6 +183,8 @@ def evaluate(
             makes files smaller.
         molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
         replay: Store what replay needs: the model, and the simulation's state and controls of every step.
+        videos: Store the images of the cameras as videos. Without them, ``mjsense render`` makes the videos of chosen
+            episodes afterwards.
         Others:
         sensors: Additional sensors, as in :func:`mjsense.record`.
         ray: ``local``, ``auto`` or the address of a Ray cluster, as in :func:`mjsense.record`.
@@ -217,21 +227,13 @@ def play(
     if isinstance(made, ReplayedPolicy):
         made.check(_settings(options), range(numbers) if isinstance(numbers, int) else numbers)
         noise = bool(made.settings.get("action_noise", False))
-    if execution_horizon is None:
-        execution_horizon = getattr(made, "execution_horizon", None)
-    if ensemble is None:
-        ensemble = getattr(made, "ensemble", None)
-    timing = {"execution_horizon": execution_horizon, "ensemble": ensemble, "latency": latency or None}
-    if any(value is not None for value in timing.values()):
-        if not isinstance(made, Policy):
-            raise ValueError(f"policy '{made}' is computed together with its episode: it has neither chunks nor latency")
-        made = Timed(made, execution_horizon=execution_horizon, ensemble=ensemble, latency=latency)
+    made, timing = timed(made, execution_horizon, ensemble, latency)
     if benchmark is not None:
         benchmark.check_starts(int(options.get("num_worlds", 4)))
     about = {
         "policy": {"spec": spec, "name": made if isinstance(made, str) else made._mjs_name(), "fingerprint": fingerprint(made)},
         "benchmark": None if benchmark is None else {"name": benchmark.name, "checksum": benchmark.checksum},
-        "settings": {name: value for name, value in timing.items() if value is not None},
+        "settings": timing,
         "episodes": numbers if isinstance(numbers, int) else list(numbers),
     }
     begun = time.perf_counter()

@@ -16,12 +16,13 @@ class BatchedPolicy(Policy):
     """An object with the method ``act(observations)`` as a policy.
 
     ``observations`` has the rows of the ``k`` worlds that need actions now, nested as in ``make_vec``:
-    ``observations["qpos"]["arm"]`` is ``[k, 7]``. Two entries are added: ``"world_ids"``, int ``[k]``, and ``"instructions"``, a list of
-    ``k`` texts. ``act`` returns their actions ``[k, n]``, or ``[k, H, n]`` for the next ``H`` steps, as NumPy arrays or PyTorch tensors.
+    ``observations["qpos"]["arm"]`` is ``[k, 7]``. Two entries are added: ``"world_ids"``, int ``[k]``, and ``"instructions"``, a
+    list of ``k`` texts. ``act`` returns their actions ``[k, n]``, or ``[k, H, n]`` for the next ``H`` steps, as NumPy arrays or
+    PyTorch tensors.
 
-    Optional: ``reset(world_ids)`` is called when new episodes start in these worlds; ``observation``, a list of names, chooses the sensors
-    or streams that ``act`` receives; ``name``; ``fingerprint()`` returns a text of what the policy depends on, which is compared when a
-    recording is resumed.
+    Optional: ``reset(world_ids)`` is called when new episodes start in these worlds; ``observation``, a list of names, chooses
+    the sensors or streams that ``act`` receives; ``name``; ``fingerprint()`` returns a text of what the policy depends on, which
+    is compared when a recording is resumed.
     """
 
     def __init__(self, model: Any, name: str = "") -> None:
@@ -46,7 +47,8 @@ class BatchedPolicy(Policy):
             groups = ", ".join(f"{name} {at.stop - at.start}" for name, at in self.action_groups.items())
             raise ValueError(
                 f"policy '{self.name}': act() returned actions of shape {actions.shape} for the episodes "
-                f"{', '.join(map(str, self._mjs_episodes[worlds]))}; expected ({len(worlds)}, {n}) or ({len(worlds)}, H, {n}) with the "
+                f"{', '.join(map(str, self._mjs_episodes[worlds]))}; expected ({len(worlds)}, {n}) or "
+                f"({len(worlds)}, H, {n}) with the "
                 f"columns {groups}"
             )
         all_rows = np.zeros((self.num_worlds, *actions.shape[1:]))

@@ -33,9 +33,9 @@ class _Recorded:
 class ReplayedPolicy(Policy):
     """Repeats the actions of a recording in the episodes with the same seed and number.
 
-    Files contain commands as float32. If the commands of a move group are joint positions, the targets of its controller are used, which
-    are recorded as float64 except in the last step of an episode that ended before its horizon. Until then the episode repeats bit for bit.
-    ``action_noise`` is that of the recording: the noise depends on the seed
+    Files contain commands as float32. If the commands of a move group are joint positions, the targets of its controller are
+    used, which are recorded as float64 except in the last step of an episode that ended before its horizon. Until then the
+    episode repeats bit for bit. ``action_noise`` is that of the recording: the noise depends on the seed
     and the episode only.
     """
 

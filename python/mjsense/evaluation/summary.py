@@ -26,8 +26,8 @@ _GROUPS = 20
 
 
 def tables_of(rows: Sequence[Row]) -> dict[str, list[Group]]:
-    """The groups of each column of :data:`GROUPED` that divides the episodes. Of instructions of which nearly all differ, the description of
-    the task takes the place."""
+    """The groups of each column of :data:`GROUPED` that divides the episodes. Of instructions of which nearly all differ, the
+    description of the task takes the place."""
     found = {word: groups_by(rows, column) for column, word in GROUPED.items()}
     if len(found["instruction"]) > len(rows) / 2:
         found["instruction"] = groups_by(rows, "description")

@@ -13,6 +13,8 @@ from typing import Any, Literal
 import gymnasium
 import numpy as np
 
+from mjsense.core.arguments import checked
+from mjsense.evaluation.policies import policy_from
 from mjsense.sensors.sensor import Sensor
 from mjsense.tasks.policy import Policy
 
@@ -38,15 +40,16 @@ class _Answer:
 class Timed(Policy):
     """Another policy whose chunks of actions are executed as on a robot.
 
-    The policy is called at an observation and answers with ``H`` actions. ``execution_horizon`` of them are executed, then it is called again
-    (by default all). With a latency of ``L`` steps, every action is executed ``L`` steps later than without it; until the first answer
-    arrives, the robot holds its position, later it executes what is left of the previous answers and then holds.
+    The policy is called at an observation and answers with ``H`` actions. ``execution_horizon`` of them are executed, then it is
+    called again (by default all). With a latency of ``L`` steps, every action is executed ``L`` steps later than without it;
+    until the first answer arrives, the robot holds its position, later it executes what is left of the previous answers and then
+    holds.
 
     Args:
         policy: The policy that is called.
         execution_horizon: Number of actions of a chunk that are executed before the policy is called again; None: all.
-        ensemble: None: the newest answer is executed. A number ``m``: the mean of all answers that have an action for the step, with the
-            weights ``exp(-m * i)``, ``i = 0`` for the oldest.
+        ensemble: None: the newest answer is executed. A number ``m``: the mean of all answers that have an action for the step,
+            with the weights ``exp(-m * i)``, ``i = 0`` for the oldest.
         latency: Delay of the answers, rounded up to whole control steps. [s]
     """
 
@@ -128,7 +131,8 @@ class Timed(Policy):
         executed = self.execution_horizon or chunk.shape[1]
         if executed > chunk.shape[1]:
             raise ValueError(
-                f"policy '{self.name}': the execution horizon is {executed}, but act() returned chunks of {chunk.shape[1]} actions"
+                f"policy '{self.name}': the execution horizon is {executed}, but act() returned chunks of "
+                f"{chunk.shape[1]} actions"
             )
         late = math.ceil(seconds / self.sim.step_dt - 1e-9)
         self._mjs_delays[due] = seconds
@@ -139,7 +143,8 @@ class Timed(Policy):
         self._mjs_next[due] = self._mjs_step[due] + executed
 
     def _action(self, world: int) -> tuple[np.ndarray, _Answer, bool] | None:
-        """The action of this step ``[n]``, the newest answer, and whether its last executed action is this one; None: there is no action."""
+        """The action of this step ``[n]``, the newest answer, and whether its last executed action is this one; None: there is no
+        action."""
         step, answers = int(self._mjs_step[world]), self._mjs_answers[world]
         arrived = [answer for answer in answers if answer.arrival <= step < answer.arrival + len(answer.actions)]
         while answers and answers[0].arrival + len(answers[0].actions) <= step + 1:
@@ -168,7 +173,8 @@ class Timed(Policy):
             chunk = self._chunk("", groups.pop("action"), len(self.action_low))
         elif missing := self.action_groups.keys() - groups.keys():
             raise ValueError(
-                f"policy '{self.name}': act() returned no command for '{min(missing)}'; execution horizon, ensembling and latency need "
+                f"policy '{self.name}': act() returned no command for '{min(missing)}'; execution horizon, "
+                "ensembling and latency need "
                 "commands for all move groups"
             )
         else:
@@ -188,6 +194,45 @@ class Timed(Policy):
                 f"({self.num_worlds}, {width}) or ({self.num_worlds}, H, {width})"
             )
         return array
+
+
+def timed(
+    policy: Policy | str, execution_horizon: int | None, ensemble: float | None, latency: Latency
+) -> tuple[Policy | str, dict[str, Any]]:
+    """The policy with this timing, and what of it was chosen, here or by the policy itself."""
+    chosen = {
+        "execution_horizon": getattr(policy, "execution_horizon", None) if execution_horizon is None else execution_horizon,
+        "ensemble": getattr(policy, "ensemble", None) if ensemble is None else ensemble,
+        "latency": latency or None,
+    }
+    chosen = {name: value for name, value in chosen.items() if value is not None}
+    if not chosen:
+        return policy, {}
+    if not isinstance(policy, Policy):
+        raise ValueError(f"policy '{policy}' is computed together with its episode: it has neither chunks nor latency")
+    return Timed(policy, **chosen), chosen
+
+
+@checked
+def wrap_policy(
+    policy: Any,
+    *,
+    policy_options: Mapping[str, Any] | None = None,
+    execution_horizon: int | None = None,
+    ensemble: float | None = None,
+    latency: float | Literal["measured"] = 0.0,
+) -> Policy | str:
+    """The policy of :func:`mjsense.evaluate` for loops of ``env.step``: everything with an argument ``policy`` takes the result.
+
+    ::
+
+        env = mjs.make("pick", policy=mjs.wrap_policy("lerobot:run/checkpoints/last/pretrained_model", latency=0.1))
+        observation, info = env.reset(seed=0)
+        observation, reward, terminated, truncated, info = env.step(env.expert_action())
+
+    The arguments are those of :func:`mjsense.evaluate`.
+    """
+    return timed(policy_from(policy, **(policy_options or {})), execution_horizon, ensemble, latency)[0]
 
 
 class _LatencySensor(Sensor):

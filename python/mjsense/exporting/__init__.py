@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Export of recordings to the formats of other programs, one module each. Modules and other programs' libraries are imported when an export
-begins."""
+"""Export of recordings to the formats of other programs, one module each. Modules and other programs' libraries are imported when
+an export begins."""
 
 from __future__ import annotations
 

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The export formats, one line each. A format is a module with these functions:
 
-- ``write(source, path, progress, **options)`` writes the episodes of a :class:`~mjsense.exporting.Source` to ``path``, a file or folder
-  that does not exist. The options are those of :data:`OPTIONS` that are named in its line and are not options of the source.
-- ``join(source, parts, path)`` writes what ``write`` would have written of all episodes, from the outputs of ``write`` for consecutive parts
-  of them. Workers of a cluster write the parts. If a module has no such function, one process writes all episodes.
+- ``write(source, path, progress, **options)`` writes the episodes of a :class:`~mjsense.exporting.Source` to ``path``, a file or
+  folder that does not exist. The options are those of :data:`OPTIONS` that are named in its line and are not options of the
+  source.
+- ``join(source, parts, path)`` writes what ``write`` would have written of all episodes, from the outputs of ``write`` for
+  consecutive parts of them. Workers of a cluster write the parts. If a module has no such function, one process writes all
+  episodes.
 
 This module imports nothing that is slow, because ``mjsense export --help`` reads it before the library is loaded.
 """
@@ -56,7 +58,8 @@ OPTIONS = {
         others="shows episodes with their times",
     ),
     "exact_rate": Option(
-        "Keep a rate that is not a whole number, which LeRobot's own tools cannot edit. By default it is rounded if that changes it "
+        "Keep a rate that is not a whole number, which LeRobot's own tools cannot edit. By default it is rounded "
+        "if that changes it "
         "by at most 5 %.",
         default=False,
         of_source=True,
@@ -81,7 +84,8 @@ FORMATS = {
         "MCAP files with Foxglove's schemas, one for each episode", "Foxglove", "mcap", "mcap_protobuf", ("encode_again",)
     ),
 }
-"""The formats by name. A module of another package adds its own line, ``FORMATS["name"] = Format(..., module="package.module")``."""
+"""The formats by name. A module of another package adds its own line,
+``FORMATS["name"] = Format(..., module="package.module")``."""
 
 
 def format_of(name: str) -> Format:

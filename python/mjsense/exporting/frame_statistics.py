@@ -17,8 +17,8 @@ _PERIOD = 20  # frames from one key frame to the next, by default; with far fewe
 def image_histograms(episode: Episode, camera: str) -> tuple[np.ndarray, int]:
     """Histograms int64 [3, 256] of the channels of an episode's images, and the number of images that they count.
 
-    The recorder counted all images. Of a trimmed episode, the images that are left are decoded. Recordings of earlier versions and of
-    MolmoSpaces have no histograms: of their videos, the key frames are decoded.
+    The recorder counted all images. Of a trimmed episode, the images that are left are decoded. Recordings of earlier versions
+    and of MolmoSpaces have no histograms: of their videos, the key frames are decoded.
     """
     counted = episode.image_histogram(camera)
     if counted is not None:
@@ -31,7 +31,8 @@ def image_histograms(episode: Episode, camera: str) -> tuple[np.ndarray, int]:
 
 
 def key_frame_histograms(path: Path, length: int) -> tuple[np.ndarray, int]:
-    """The same of the key frames of a video of ``length`` frames, which need no others to be decoded. If it has few, of every 20th frame."""
+    """The same of the key frames of a video of ``length`` frames, which need no others to be decoded. If it has few, of every
+    20th frame."""
     found = _decoded(path, None)
     return found if found[1] * 2 * _PERIOD >= length else _decoded(path, {*range(0, length, _PERIOD)})
 

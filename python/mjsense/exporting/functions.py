@@ -97,18 +97,18 @@ export_lerobot = _export_to("lerobot")
 export_lerobot21 = _export_to("lerobot21")
 """Writes a recording as a LeRobot v2.1 data set with ``meta/modality.json``."""
 export_robomimic = _export_to("robomimic")
-"""Writes a recording as one HDF5 file of robomimic, with simulator states and the model of each demonstration if the recording has
-data for replay. Images are decoded, because robomimic reads arrays."""
+"""Writes a recording as one HDF5 file of robomimic, with simulator states and the model of each demonstration if the recording
+has data for replay. Images are decoded, because robomimic reads arrays."""
 export_rlds = _export_to("rlds")
-"""Writes a recording as an RLDS data set, which ``tfds.builder(out.name, data_dir=out.parent)`` reads. Images are stored as PNG. The name of
-``out`` is that of the data set: small letters, digits and ``_``."""
+"""Writes a recording as an RLDS data set, which ``tfds.builder(out.name, data_dir=out.parent)`` reads. Images are stored as PNG.
+The name of ``out`` is that of the data set: small letters, digits and ``_``."""
 export_zarr = _export_to("zarr")
-"""Writes a recording as a Zarr 2 folder: arrays of all steps of all episodes in ``data``, and ``meta/episode_ends``, as Diffusion Policy's
-``ReplayBuffer`` reads them. Images are decoded."""
+"""Writes a recording as a Zarr 2 folder: arrays of all steps of all episodes in ``data``, and ``meta/episode_ends``, as Diffusion
+Policy's ``ReplayBuffer`` reads them. Images are decoded."""
 export_rerun = _export_to("rerun")
-"""Writes a recording as a folder of ``.rrd`` files, one for each episode, which ``rerun OUT/*.rrd`` shows: the videos as they are, depth
-images, features as curves, and, if the recording has data for replay, the geoms of the scene."""
+"""Writes a recording as a folder of ``.rrd`` files, one for each episode, which ``rerun OUT/*.rrd`` shows: the videos as they
+are, depth images, features as curves, and, if the recording has data for replay, the geoms of the scene."""
 export_mcap = _export_to("mcap")
 """Writes a recording as a folder of MCAP files, one for each episode, which Foxglove and Rerun show: H.264 videos, depth images,
-calibrations, poses of cameras and of the model's bodies, joint states, and features as JSON messages. Raises ValueError if a video has
-B-frames and ``encode_again`` is False."""
+calibrations, poses of cameras and of the model's bodies, joint states, and features as JSON messages. Raises ValueError if a
+video has B-frames and ``encode_again`` is False."""

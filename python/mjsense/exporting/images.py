@@ -18,8 +18,8 @@ from mjsense.exporting.remux import ends_with_last_frame
 
 CRF = 18
 """Quality of videos that are encoded again, better than the recording's own."""
-# As the recorder's, but for two options: crf, and mbtree, which in x264 165 with AVX-512 reads memory that was never written. In a
-# program that has run for a while, the same images would become different files.
+# As the recorder's, but for two options: crf, and mbtree, which in x264 165 with AVX-512 reads memory that was never written. In
+# a program that has run for a while, the same images would become different files.
 _OPTIONS = {"preset": "veryfast", "tune": "fastdecode", "crf": str(CRF), "bf": "0", "g": "20", "mbtree": "0"}
 FLAGS = ("reward", "success", "terminated", "truncated")
 """Features that every export has."""
@@ -58,8 +58,8 @@ def padded(image: np.ndarray) -> Any:
 def video_file(video: Video, folder: Path) -> Iterator[tuple[Path, int]]:
     """The file of a colour video, of which the first ``len(video) - 1`` frames belong to steps, and its number of frames.
 
-    The video of a trimmed episode, or one in which other frames need the last frame, is encoded again, without the last frame, into ``folder``,
-    and deleted at the end of the block.
+    The video of a trimmed episode, or one in which other frames need the last frame, is encoded again, without the last frame,
+    into ``folder``, and deleted at the end of the block.
     """
     video.check()
     if not video.trimmed and ends_with_last_frame(video.path):

@@ -89,8 +89,8 @@ class _Videos:
     def add(self, path: Path, fps: Fraction, frames: int, length: int) -> tuple[dict[str, int], float]:
         """Appends the first ``length`` frames of a video. Returns its file and the time of its first frame there.
 
-        LeRobot's StreamingLeRobotDataset computes the time of a frame from the number of its row in the whole data set, so a file must not
-        contain any other frame.
+        LeRobot's StreamingLeRobotDataset computes the time of a frame from the number of its row in the whole data set, so a file
+        must not contain any other frame.
 
         Args:
             fps: Rate of the video.
@@ -113,8 +113,9 @@ class _Videos:
         return Concatenation(self._folder / (_PLACE.format(**_place(self._file)) + ".mp4"), self._fps)
 
     def _found_by_time(self, length: int) -> bool:
-        """Whether LeRobot's reader finds every frame. It adds times of 32 bits to the time of the first frame and compares the sum, in 32 bits,
-        with the time of the frame: late in a long file, a sum that is rounded to the other side differs by more than the tolerance."""
+        """Whether LeRobot's reader finds every frame. It adds times of 32 bits to the time of the first frame and compares the
+        sum, in 32 bits, with the time of the frame: late in a long file, a sum that is rounded to the other side differs by more
+        than the tolerance."""
         exact = times(length, self._fps, self._video.frames)
         added = exact[0] + times(length, self._fps).astype(np.float32).astype(np.float64)
         return bool((np.abs(added.astype(np.float32) - exact.astype(np.float32)) < _TOLERANCE_S).all())
@@ -188,7 +189,8 @@ class Writer:
         print_rate(self._source)
 
     def _add_depth(self, episode: Episode, camera: str, videos: _Videos) -> tuple[dict[str, int], float, tuple[np.ndarray, int]]:
-        """Encodes a depth video as LeRobot expects it, and writes the exact one to ``extras``; MolmoSpaces' is exact only as a whole."""
+        """Encodes a depth video as LeRobot expects it, and writes the exact one to ``extras``; MolmoSpaces' is exact only as a
+        whole."""
         video = self._source.video(episode, camera)
         exact = self._path / f"extras/depth/{camera}/episode_{self._count:06d}{video.path.suffix}"
         if not video.trimmed:

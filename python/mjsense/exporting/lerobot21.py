@@ -103,8 +103,8 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
 
 
 def modality_of(source: Source) -> dict[str, Any]:
-    """The parts of state and action by move group, the cameras, and the instruction, as GR00T's loader expects them. Other features have
-    their own names; one with several streams is followed by the name of the stream: ``velocity_arm``."""
+    """The parts of state and action by move group, the cameras, and the instruction, as GR00T's loader expects them. Other
+    features have their own names; one with several streams is followed by the name of the stream: ``velocity_arm``."""
     result: dict[str, Any] = {"state": {}, "action": {}}
     names: list[tuple[str, str]] = []
     for feature in exported(source):

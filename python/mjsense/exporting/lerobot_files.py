@@ -48,13 +48,15 @@ def print_rate(source: Source) -> None:
     exact, longer = float(source.recorded_fps), float(source.recorded_fps / source.fps) - 1
     if source.fps != source.recorded_fps:
         print(
-            f"{exact:.6g} rows per second are written as {source.fps}, because LeRobot's rates are whole numbers: times are {abs(longer):.1%} "
+            f"{exact:.6g} rows per second are written as {source.fps}, because LeRobot's rates are whole numbers: "
+            f"times are {abs(longer):.1%} "
             f"{'longer' if longer > 0 else 'shorter'}; --exact-rate (exact_rate=True) keeps the rate. {_WHOLE_RATE}",
             file=sys.stderr,
         )
     elif source.fps.denominator != 1:
         print(
-            f"{exact:.6g} rows per second are not a whole number: LeRobot reads the data set, but cannot delete, split or append episodes. "
+            f"{exact:.6g} rows per second are not a whole number: LeRobot reads the data set, but cannot delete, "
+            "split or append episodes. "
             f"{_WHOLE_RATE}",
             file=sys.stderr,
         )
@@ -93,7 +95,8 @@ def features_of(source: Source, codec: dict[str, Any]) -> dict[str, Any]:
 
 
 def columns_of(source: Source, episode: Episode, position: int, first_index: int, task_index: int) -> dict[str, np.ndarray]:
-    """Columns of an episode: ``[T - 1, size]``, and ``[T - 1]`` of single numbers. The last observation has no action and is left out."""
+    """Columns of an episode: ``[T - 1, size]``, and ``[T - 1]`` of single numbers. The last observation has no action and is left
+    out."""
     rows = source.rows(episode)
     length = episode.length - 1
     columns = {key_of(feature): rows[feature.name][:length].astype(_dtype(feature.dtype)) for feature in exported(source)}
@@ -143,8 +146,8 @@ def codec_of(path: Path) -> dict[str, Any]:
 
 
 class Statistics:
-    """Statistics of all columns and cameras, of each episode and of all of them together, as JSON and Arrow take them: lists by the name of
-    the column or image and by that of the statistic."""
+    """Statistics of all columns and cameras, of each episode and of all of them together, as JSON and Arrow take them: lists by
+    the name of the column or image and by that of the statistic."""
 
     def __init__(self) -> None:
         self._columns: dict[str, list[np.ndarray]] = {}

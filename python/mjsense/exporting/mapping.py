@@ -35,11 +35,11 @@ class Mapping:
     numbers of all streams of a feature are concatenated."""
 
     state: tuple[str, ...] | None = None
-    """Streams of the robot's state; None: ``obs/agent/qpos``, and in recordings of :class:`mjsense.RecordEpisodes` the observation without
-    its images."""
+    """Streams of the robot's state; None: ``obs/agent/qpos``, and in recordings of :class:`mjsense.RecordEpisodes` the
+    observation without its images."""
     action: tuple[str, ...] | None = None
-    """Streams of the action; None: ``actions/joint_pos``, and ``actions/commanded_action`` of move groups without joint targets; in
-    recordings of :class:`mjsense.RecordEpisodes` ``actions/action``."""
+    """Streams of the action; None: ``actions/joint_pos``, and ``actions/commanded_action`` of move groups without joint targets;
+    in recordings of :class:`mjsense.RecordEpisodes` ``actions/action``."""
     cameras: dict[str, str] | None = None
     """Cameras by exported name; None: all colour cameras with their own names."""
     features: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -113,9 +113,10 @@ class Source:
         map: A :class:`Mapping`, a TOML file, or a dict of the same form; by default :class:`Mapping`'s defaults.
         episodes: Positions of episodes in the recording; by default all.
         success: Only successful (True) or only failed (False) episodes.
-        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.dataset.Episode.trimmed`); None: in episodes whose task places an
-            object.
-        whole_rate: Round ``fps`` to a whole number, as formats need whose rates are whole numbers, if that changes it by at most 5 %.
+        trim_idle: Leave out the steps in which nothing moves (:meth:`mjsense.dataset.Episode.trimmed`); None: in episodes whose
+            task places an object.
+        whole_rate: Round ``fps`` to a whole number, as formats need whose rates are whole numbers, if that changes it by at most
+            5 %.
     """
 
     def __init__(
@@ -159,8 +160,8 @@ class Source:
         if not state:  # an environment whose observation has no numbers
             del wanted["state"]
         self.features: dict[str, Feature] = {name: _feature(chosen, name, streams, known) for name, streams in wanted.items()}
-        """``state``, ``action``, ``reward``, ``success``, ``terminated``, ``truncated``, and the mapping's other features. Without ``state`` if
-        the recorded observation consists of images."""
+        """``state``, ``action``, ``reward``, ``success``, ``terminated``, ``truncated``, and the mapping's other features.
+        Without ``state`` if the recorded observation consists of images."""
         self.tasks: list[str] = list(dict.fromkeys(episode.task for episode in self.episodes))
         """The distinct instructions, in the order of their first episode."""
         colour = [
@@ -168,7 +169,8 @@ class Source:
         ]
         if mapping.state is None:
             self._notes += [
-                f"the image '{name}' is recorded as an array and left out; RecordEpisodes(image_videos=True) records RGB images as videos"
+                f"the image '{name}' is recorded as an array and left out; RecordEpisodes(image_videos=True) "
+                "records RGB images as videos"
                 for name in known
                 if _observed(name) and _is_image(known[name])
             ]
@@ -205,11 +207,11 @@ class Source:
             print(note, file=sys.stderr)
 
     def rows(self, episode: Episode) -> dict[str, np.ndarray]:
-        """Numbers of an episode by feature, ``[T, size]``, and ``[T - 1, size]`` of features of steps: row t of the action is the action
-        that was taken at observation t.
+        """Numbers of an episode by feature, ``[T, size]``, and ``[T - 1, size]`` of features of steps: row t of the action is the
+        action that was taken at observation t.
 
-        A move group without an action keeps its last one. Before its first action, a joint target is the measured position if that has
-        the same size; otherwise, and in relative actions (``joint_pos_rel``, ``ee_twist``), it is 0.
+        A move group without an action keeps its last one. Before its first action, a joint target is the measured position if
+        that has the same size; otherwise, and in relative actions (``joint_pos_rel``, ``ee_twist``), it is 0.
         """
         names = {stream for feature in self.features.values() for stream in feature.streams}
         names |= {mask for name in names if (mask := given_name(name))} | {_measured(name) for name in names} - {""}
@@ -228,7 +230,8 @@ class Source:
             mask = given_name(stream)
             if values is None and mask is None:
                 raise UnknownNameError(
-                    f"Episode {episode.index} ({episode.path.name}) has no stream '{stream}', which the feature '{feature.name}' needs"
+                    f"Episode {episode.index} ({episode.path.name}) has no stream '{stream}', which the feature "
+                    f"'{feature.name}' needs"
                 )
             if mask is not None:
                 values = _filled(stream, values, loaded.get(mask), loaded.get(_measured(stream)), episode.length, size)
@@ -239,8 +242,8 @@ class Source:
 
 
 def places(episode: Episode) -> bool:
-    """Whether the episode's task puts an object in, on or next to another one, as its recording says: one of its objects has the role
-    ``place_receptacle``."""
+    """Whether the episode's task puts an object in, on or next to another one, as its recording says: one of its objects has the
+    role ``place_receptacle``."""
     return "place_receptacle" in episode.obs_scene.get("objects", {}) or "place_receptacle_name" in episode.obs_scene
 
 
@@ -272,7 +275,8 @@ def check_names(names: Iterable[tuple[str, str]]) -> None:
 
 
 def named_streams(source: Source, features: Iterable[str], place: str = "", image: str = "") -> Iterator[tuple[str, str]]:
-    """Names in an export, for :func:`check_names`: those of features and cameras, and of the depth images that formats add to cameras.
+    """Names in an export, for :func:`check_names`: those of features and cameras, and of the depth images that formats add to
+    cameras.
 
     Args:
         place: Start of the names, such as ``obs/``.
@@ -300,7 +304,8 @@ def _feature(chosen: Dataset, name: str, streams: tuple[str, ...], known: dict[s
         about = known[stream]
         if about.kind == "video" or about.dtype == object or about.dtype.itemsize * int(np.prod(about.shape)) >= LARGE_ROW:
             raise ValueError(
-                f"The feature '{name}' cannot contain the stream {about}: it must be numbers, fewer than {LARGE_ROW} bytes per row"
+                f"The feature '{name}' cannot contain the stream {about}: it must be numbers, fewer than "
+                f"{LARGE_ROW} bytes per row"
             )
         short = stream if "/" not in stream else stream.rsplit("/", 1)[1]
         short = short if short not in parts else stream

@@ -112,7 +112,8 @@ def _video(source: Source, episode: Episode, name: str, encode_again: bool) -> I
     if packets is None:
         if not encode_again:
             raise ValueError(
-                f"{video.path} has B-frames, which MCAP's CompressedVideo does not allow: record without B-frames, or pass encode_again=True (--encode-again)"
+                f"{video.path} has B-frames, which MCAP's CompressedVideo does not allow: record without B-frames, "
+                "or pass encode_again=True (--encode-again)"
             )
         packets = _encoded(video)
     for t, packet in enumerate(packets):

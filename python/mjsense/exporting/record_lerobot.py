@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """``record --format lerobot``: a recording that is converted to another format while it is made.
 
-The recording is made in the folder ``OUT.recording`` as always, so it is crash-safe and can be resumed. A thread adds each published HDF5
-file to a data set in the folder ``OUT.part``, which is renamed to ``OUT`` when the recording is complete. After a crash the data set is
-written again from the beginning, which takes little time, because the recording contains the videos and the histograms of their images.
+The recording is made in the folder ``OUT.recording`` as always, so it is crash-safe and can be resumed. A thread adds each
+published HDF5 file to a data set in the folder ``OUT.part``, which is renamed to ``OUT`` when the recording is complete. After a
+crash the data set is written again from the beginning, which takes little time, because the recording contains the videos and the
+histograms of their images.
 """
 
 from __future__ import annotations
@@ -163,7 +164,8 @@ class _Conversion(threading.Thread):
             if not self._complete():
                 raise _UnfinishedError
             if self.writer is None or any(about != abouts[0] for about in abouts) or done != files:
-                # Files have different features, for example because a move group never acts in one: only all together decide them.
+                # Files have different features, for example because a move group never acts in one: only all together decide
+                # them.
                 shutil.rmtree(path, ignore_errors=True)
                 whole = Source(self._recording, **self._options)
                 self.writer = self._new_writer(whole, path)

@@ -22,8 +22,8 @@ def ends_with_last_frame(path: Path) -> bool:
 
 
 class Concatenation:
-    """An MP4 file that contains the packets of other MP4 files one after another. Frame ``n`` has the time ``n / fps``, whatever the rate of
-    the other files is."""
+    """An MP4 file that contains the packets of other MP4 files one after another. Frame ``n`` has the time ``n / fps``, whatever
+    the rate of the other files is."""
 
     def __init__(self, path: Path, fps: Fraction) -> None:
         self.frames = 0
@@ -38,7 +38,8 @@ class Concatenation:
             self._file.close()
 
     def add(self, path: Path, fps: Fraction, frames: int, kept: int) -> bool:
-        """Appends the first frames of a video. Returns False if it does not fit: the codec's parameters (SPS and PPS) of the others differ.
+        """Appends the first frames of a video. Returns False if it does not fit: the codec's parameters (SPS and PPS) of the
+        others differ.
 
         Args:
             path: The video, which must have the rate ``fps`` and this number of frames.
@@ -50,7 +51,8 @@ class Concatenation:
             packets = [packet for packet in video.demux(stream) if packet.dts is not None]
             if len(packets) != frames:
                 raise ValueError(
-                    f"{path} has {len(packets)} frames, but its episode has {frames} observations; `mjsense verify` checks the files"
+                    f"{path} has {len(packets)} frames, but its episode has {frames} observations; `mjsense verify` "
+                    "checks the files"
                 )
             tick = 1 / (fps * stream.time_base)  # of one frame
             if tick.denominator != 1 or sorted(packet.pts for packet in packets) != [n * tick.numerator for n in range(frames)]:

@@ -125,7 +125,8 @@ def _image_entity(name: str) -> str:
 
 
 def _blueprint(source: Source, episode: Episode) -> Any:
-    """Layout of the viewer: the scene, seen from 37 degrees to the side of the camera that moves least, the videos, and the curves."""
+    """Layout of the viewer: the scene, seen from 37 degrees to the side of the camera that moves least, the videos, and the
+    curves."""
     import rerun.blueprint as rrb  # pyright: ignore[reportMissingImports]
 
     poses = [pose for name in source.cameras if (pose := _camera_poses(source, episode, name)) is not None]

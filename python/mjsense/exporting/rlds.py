@@ -53,7 +53,8 @@ def _write_data_set(source: Source, records: Iterable[bytes], path: Path) -> Non
     if not re.fullmatch("[a-z][a-z0-9_]*", name):
         valid = re.sub(r"\W+", "_", name.lower())
         raise ValueError(
-            f"The folder '{name}' cannot be the name of a data set of tensorflow-datasets; use small letters, digits and _, such as '{valid}'"
+            f"The folder '{name}' cannot be the name of a data set of tensorflow-datasets; use small letters, "
+            f"digits and _, such as '{valid}'"
         )
     folder = path / _VERSION
     folder.mkdir(parents=True)

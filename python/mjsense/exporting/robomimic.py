@@ -141,7 +141,8 @@ def _write_video(demo: Any, name: str, video: Video) -> None:
 
 
 def _write_states(demo: Any, models: dict[bytes, Any], episode: Episode) -> None:
-    """``states`` as robosuite's ``MjSimState.flatten``: time, qpos, qvel. ``integration_states`` is all that MuJoCo's state contains."""
+    """``states`` as robosuite's ``MjSimState.flatten``: time, qpos, qvel. ``integration_states`` is all that MuJoCo's state
+    contains."""
     model = episode.model()
     states = episode.states[:-1]
     numbers = 1 + model.nq + model.nv  # mjSTATE_INTEGRATION begins with time, qpos, qvel

@@ -69,8 +69,8 @@ class Body:
 
 
 def bodies(episode: Episode) -> list[Body]:
-    """Bodies with visible geoms, without objects that are absent in the episode. Empty if the recording has no data for replay, or
-    another MuJoCo is installed."""
+    """Bodies with visible geoms, without objects that are absent in the episode. Empty if the recording has no data for replay,
+    or another MuJoCo is installed."""
     if mujoco is None or "replay/state" not in episode.streams:
         return []
     model = episode.model()

@@ -46,8 +46,8 @@ def write(source: Source, path: Path, progress: Callable[[int, int], None] | Non
 
 
 def join(source: Source, parts: Iterable[Path], path: Path) -> None:
-    """Writes the new folder ``path`` with the rows of several folders in their order. Chunks that lie in one part are moved; only those in
-    which two parts meet are compressed again.
+    """Writes the new folder ``path`` with the rows of several folders in their order. Chunks that lie in one part are moved; only
+    those in which two parts meet are compressed again.
 
     Args:
         source: The episodes of all parts.
@@ -79,7 +79,8 @@ def _zarr() -> Any:
     zarr = needs("zarr", "zarr")
     if not zarr.__version__.startswith("2."):
         raise RuntimeError(
-            f"Export to Zarr needs zarr 2, which Diffusion Policy reads; installed is {zarr.__version__}: pip install 'mjsense[zarr]'"
+            f"Export to Zarr needs zarr 2, which Diffusion Policy reads; installed is {zarr.__version__}: pip "
+            "install 'mjsense[zarr]'"
         )
     return zarr
 

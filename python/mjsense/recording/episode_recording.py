@@ -104,7 +104,8 @@ class EpisodeRecording:
         self._mujoco = MujocoEnvs(self._single_envs(), sensors, decimation) if needs_mujoco else None
         if self.autoreset == AutoresetMode.SAME_STEP and (self._cameras or sensors):
             raise ValueError(
-                "RecordEpisodes: cameras and sensors do not see the last state of an episode with AutoresetMode.SAME_STEP; use NEXT_STEP"
+                "RecordEpisodes: cameras and sensors do not see the last state of an episode with "
+                "AutoresetMode.SAME_STEP; use NEXT_STEP"
             )
         name = getattr(env.spec, "id", None) or type(env.unwrapped).__name__
         self._settings = {"env": name, "cameras": self._cameras, "camera_size": self._size, **(settings or {})}
@@ -134,7 +135,8 @@ class EpisodeRecording:
         envs = getattr(self._env.unwrapped, "envs", None)
         if envs is None:
             raise TypeError(
-                f"RecordEpisodes: the environments of {self._env} are in other processes, where sensors and cameras cannot see them: "
+                f"RecordEpisodes: the environments of {self._env} are in other processes, where sensors and cameras "
+                "cannot see them: "
                 "use the camera 'render', or wrap each environment where it is made, with house=0, 1, 2 ..."
             )
         return envs
@@ -220,7 +222,8 @@ class EpisodeRecording:
             core = self._open(next(iter(images.values())))
             if core.enough and core.kept < self._episodes:
                 raise ValueError(
-                    f"RecordEpisodes: '{self.path}' was published with {core.kept} of {self._episodes} episodes and cannot be continued: "
+                    f"RecordEpisodes: '{self.path}' was published with {core.kept} of {self._episodes} episodes and "
+                    "cannot be continued: "
                     "choose another folder or house"
                 )
             self._core, self.complete = core, core.enough
@@ -258,7 +261,8 @@ class EpisodeRecording:
             image = np.asarray(frames[world] if self._vector and frames is not None else frames)
             if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
                 raise ValueError(
-                    f"RecordEpisodes: env.render() has returned {image.dtype} {image.shape}, expected a uint8 image (height, width, 3): "
+                    f"RecordEpisodes: env.render() has returned {image.dtype} {image.shape}, expected a uint8 image "
+                    "(height, width, 3): "
                     "make the environment with render_mode='rgb_array'"
                 )
             images[name] = image
@@ -277,7 +281,8 @@ class EpisodeRecording:
                 stream, shape = self._stream_of(name, row), row.shape
                 if stream in names:
                     raise ValueError(
-                        f"RecordEpisodes: two images of the observation would be the video '{stream}': rename one, or pass image_videos=False"
+                        f"RecordEpisodes: two images of the observation would be the video '{stream}': rename one, "
+                        "or pass image_videos=False"
                     )
                 names.add(stream)
                 video = self._is_video(name, row)
@@ -320,7 +325,8 @@ class EpisodeRecording:
                 value: Any = 0 if values is None else values[i]
                 if values is not None and np.shape(value) != row.shape:
                     raise ValueError(
-                        f"RecordEpisodes: '{'/'.join((name, *row.path))}' has the shape {np.shape(value)}, expected {row.shape} as in its space"
+                        f"RecordEpisodes: '{'/'.join((name, *row.path))}' has the shape {np.shape(value)}, expected "
+                        f"{row.shape} as in its space"
                     )
                 if values is not None and self._is_video(name, row) and row.shape[2] != _RGB:
                     value = np.moveaxis(value, 0, -1)

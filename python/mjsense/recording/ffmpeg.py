@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The ffmpeg program that writes and reads videos: the one in ``PATH``, otherwise that of the package imageio-ffmpeg (extra ``video``)."""
+"""The ffmpeg program that writes and reads videos: the one in ``PATH``, otherwise that of the package imageio-ffmpeg (extra
+``video``)."""
 
 from __future__ import annotations
 
@@ -32,8 +33,8 @@ def use_installed_ffmpeg() -> None:
 def frames_of(video: Path, descriptor: int, options: Sequence[str], output: Sequence[str], max_bytes: int) -> bytes:
     """Raw frames of a video, which ffmpeg prints; ``options`` are those of the input.
 
-    As in the C++ library, ffmpeg reads only this file, as MP4 with H.264 or as Matroska with FFV1, and its time, memory, output and
-    messages are limited. It finds the file by our open descriptor, so that the name is neither an option nor a protocol.
+    As in the C++ library, ffmpeg reads only this file, as MP4 with H.264 or as Matroska with FFV1, and its time, memory, output
+    and messages are limited. It finds the file by our open descriptor, so that the name is neither an option nor a protocol.
 
     Raises:
         RuntimeError: There is no ffmpeg, or it fails or exceeds a limit.

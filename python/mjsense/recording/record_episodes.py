@@ -43,7 +43,8 @@ class _Recorded:
     """Base class of both wrappers, before that of Gymnasium."""
 
     recording: EpisodeRecording
-    """State of the recording: ``path`` is its folder, ``kept`` the number of recorded episodes, ``complete`` whether all are recorded."""
+    """State of the recording: ``path`` is its folder, ``kept`` the number of recorded episodes, ``complete`` whether all are
+    recorded."""
 
     @partial(checked, context="RecordEpisodes()")
     def __init__(
@@ -100,7 +101,8 @@ class _Recorded:
         self.close()  # pyright: ignore[reportAttributeAccessIssue]  # Gymnasium's
 
     def __del__(self) -> None:
-        """Does nothing: Gymnasium before 1.3 closes vector environments here, which would publish the recording of a program that fails."""
+        """Does nothing: Gymnasium before 1.3 closes vector environments here, which would publish the recording of a program that
+        fails."""
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(f"{type(self).__name__}: cannot be copied or pickled; make one in each process, with house=0, 1, 2 ...")
@@ -110,26 +112,28 @@ class _Recorded:
 class RecordEpisodes(_Recorded, gymnasium.Wrapper, metaclass=ABCMeta):  # RecordVectorEpisodes is registered as a virtual subclass
     """Records the episodes of a Gymnasium environment, MuJoCo or not, to the files of :func:`mjsense.record`::
 
-        env = mjs.RecordEpisodes(gymnasium.make("HalfCheetah-v5", render_mode="rgb_array"), "data", episodes=10, cameras={"view": "render"})
+        env = mjs.RecordEpisodes(gymnasium.make("HalfCheetah-v5", render_mode="rgb_array"), "data", episodes=10, cameras={"view":
+        "render"})
 
-    Given a ``gymnasium.vector.VectorEnv``, it returns a :class:`RecordVectorEpisodes`, which does the same for all its environments,
-    and which ``isinstance`` regards as a ``RecordEpisodes``.
+    Given a ``gymnasium.vector.VectorEnv``, it returns a :class:`RecordVectorEpisodes`, which does the same for all its
+    environments, and which ``isinstance`` regards as a ``RecordEpisodes``.
 
-    Recorded are the observation, as ``observation`` or one stream for each entry of a dict or tuple, the action that led to it, the reward,
-    ``terminated``, ``truncated``, all infos that JSON can express, the cameras and the sensors. A finished episode is safe on disk. When
-    `episodes` are recorded, or at ``close()``, the recording is published, and the environment runs on without it. An exception that
-    ends a ``with`` block leaves the recording unpublished, so that ``resume=True`` can continue it.
+    Recorded are the observation, as ``observation`` or one stream for each entry of a dict or tuple, the action that led to it,
+    the reward, ``terminated``, ``truncated``, all infos that JSON can express, the cameras and the sensors. A finished episode is
+    safe on disk. When `episodes` are recorded, or at ``close()``, the recording is published, and the environment runs on without
+    it. An exception that ends a ``with`` block leaves the recording unpublished, so that ``resume=True`` can continue it.
 
     Args:
         env: The environment.
         out: Output directory; the files are in ``out/house_<house>/``.
         episodes: Number of episodes to keep.
-        cameras: Videos by name: ``"render"`` is ``env.render()``; any other value is a camera (name or id) of the environment's MuJoCo model,
-            which :class:`mjsense.Renderer` draws. A sequence of names gives cameras of the model their own names.
+        cameras: Videos by name: ``"render"`` is ``env.render()``; any other value is a camera (name or id) of the environment's
+            MuJoCo model, which :class:`mjsense.Renderer` draws. A sequence of names gives cameras of the model their own names.
         sensors: Sensors over the environment's MuJoCo model, as for :func:`mjsense.attach`.
         camera_size: Height and width of the images of the model's cameras, pixels.
         decimation: Number of ``mj_step`` calls in a step of the environment; by default its ``frame_skip`` or ``n_substeps``.
-        fps: Steps per second; by default ``1 / env.unwrapped.dt``, else ``env.unwrapped.control_freq``, else the metadata's ``render_fps``, else 30.
+        fps: Steps per second; by default ``1 / env.unwrapped.dt``, else ``env.unwrapped.control_freq``, else the metadata's
+            ``render_fps``, else 30.
 
         Options:
         resume: Continue an interrupted recording; all settings that affect the data must be unchanged.
@@ -147,8 +151,8 @@ class RecordEpisodes(_Recorded, gymnasium.Wrapper, metaclass=ABCMeta):  # Record
         molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
         Others:
         keep_partial: Keep episodes that ``reset()`` or ``close()`` cuts short; by default they are discarded.
-        image_videos: Store RGB images in the observation, uint8 ``[H, W, 3]`` or ``[3, H, W]``, as videos, which exports contain and which are
-            smaller, but not exact. By default they are stored exactly, as arrays.
+        image_videos: Store RGB images in the observation, uint8 ``[H, W, 3]`` or ``[3, H, W]``, as videos, which exports contain
+            and which are smaller, but not exact. By default they are stored exactly, as arrays.
         info_bytes: Maximum length of the JSON text of a step's infos.
         settings: Further settings that produced the data, as JSON: stored in every file, and equal when a recording is resumed.
 

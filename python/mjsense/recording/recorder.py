@@ -54,9 +54,9 @@ class Recorder(KnownAttributes):
                 recorder.append([0], reward=[1.0])
             recorder.finish_episode(0, {"task_description": "walk"})
 
-    Episodes are identified by their numbers, from ``first_attempt`` (0) without gaps; each is kept, discarded or abandoned. A finished episode is
-    safe on disk. One that was not finished when the program died can be attempted again with ``resume=True``. The recording is
-    completed at the end of the ``with`` block, unless an exception ends it.
+    Episodes are identified by their numbers, from ``first_attempt`` (0) without gaps; each is kept, discarded or abandoned. A
+    finished episode is safe on disk. One that was not finished when the program died can be attempted again with ``resume=True``.
+    The recording is completed at the end of the ``with`` block, unless an exception ends it.
     """
 
     def __init__(

@@ -23,7 +23,8 @@ class WrittenRows:
         """Declares a stream.
 
         Args:
-            more: Other fields of its specification, such as ``unit``, ``frame``, ``low``, ``high``, and ``video=True`` for images that become a video.
+            more: Other fields of its specification, such as ``unit``, ``frame``, ``low``, ``high``, and ``video=True`` for images
+                that become a video.
 
         Returns:
             The array ``[B, *shape]`` to write the current rows to.

@@ -26,9 +26,11 @@ if TYPE_CHECKING:
 # fmt: off
 _MODEL_ARRAYS = (
     "mesh_vertadr", "mesh_vertnum", "mesh_faceadr", "mesh_facenum", "mesh_normaladr", "mesh_normalnum", "mesh_texcoordadr",
-    "mesh_texcoordnum", "mesh_graphadr", "mesh_vert", "mesh_normal", "mesh_texcoord", "mesh_face", "mesh_facenormal", "mesh_facetexcoord",
+    "mesh_texcoordnum", "mesh_graphadr", "mesh_vert", "mesh_normal", "mesh_texcoord", "mesh_face", "mesh_facenormal",
+    "mesh_facetexcoord",
     "mesh_graph", "hfield_adr", "hfield_nrow", "hfield_ncol", "hfield_size", "hfield_data", "skin_vertadr", "skin_vertnum",
-    "skin_texcoordadr", "skin_faceadr", "skin_facenum", "skin_vert", "skin_texcoord", "skin_face", "tex_adr", "tex_type", "tex_width",
+    "skin_texcoordadr", "skin_faceadr", "skin_facenum", "skin_vert", "skin_texcoord", "skin_face", "tex_adr", "tex_type",
+    "tex_width",
     "tex_height", "tex_nchannel", "tex_colorspace", "tex_data", "mat_texid", "mat_texuniform", "mat_texrepeat",
     "mat_metallic", "mat_roughness", "light_type", "light_texid", "light_active",
 )
@@ -40,7 +42,8 @@ _SCENE_ARRAYS = (
 )
 
 _SIZES = (
-    "nq", "nv", "nbody", "ngeom", "nsite", "ncam", "nlight", "nmesh", "nskin", "nflex", "nflexvert", "ntendon", "nu", "ntex", "nmat",
+    "nq", "nv", "nbody", "ngeom", "nsite", "ncam", "nlight", "nmesh", "nskin", "nflex", "nflexvert", "ntendon", "nu", "ntex",
+    "nmat",
 )
 # fmt: on
 
@@ -110,8 +113,8 @@ class Renderer:
         renderer.update_scene(data, camera="front")
         image = renderer.render()  # uint8 [240, 320, 3]
 
-    One thread at a time can use a renderer: a call during that of another thread is an error, and ``close()`` waits for it. Use one
-    renderer per thread, or ``render_batch``, which several threads may call at the same time.
+    One thread at a time can use a renderer: a call during that of another thread is an error, and ``close()`` waits for it. Use
+    one renderer per thread, or ``render_batch``, which several threads may call at the same time.
 
     Args:
         model: the ``mujoco.MjModel``.
@@ -188,7 +191,8 @@ class Renderer:
             "fog_slope": 1 / (extent * max(map_.fogend - map_.fogstart, 1e-6)),
             "fog_rgb": tuple(float(x) for x in rgba.fog[:3]),
             "line_width": float(model.vis.global_.linewidth),
-            # 3.12 wraps 2D textures around spheres, cylinders and so on, and repeats those of meshes; earlier versions project them along z.
+            # 3.12 wraps 2D textures around spheres, cylinders and so on, and repeats those of meshes; earlier versions project
+            # them along z.
             "projected_textures": self._version < (3, 12),
             "point_lights_at_camera": self._version < (3, 12),
             "sized_soft_textures": self._version < (3, 13),
@@ -220,8 +224,9 @@ class Renderer:
 
     @property
     def point_lights(self) -> bool:
-        """Whether lights of type ``point`` shine from their position, as in the cameras of scenes, without attenuation. False, the default: as in MuJoCo's
-        OpenGL renderer, which draws point and image lights as lights at the camera before 3.12, and not at all from 3.12 on."""
+        """Whether lights of type ``point`` shine from their position, as in the cameras of scenes, without attenuation. False,
+        the default: as in MuJoCo's OpenGL renderer, which draws point and image lights as lights at the camera before 3.12, and
+        not at all from 3.12 on."""
         return self._point_lights
 
     @point_lights.setter
@@ -234,8 +239,8 @@ class Renderer:
 
     @property
     def shading(self) -> str:
-        """``"classic"``, the default: MuJoCo's light model; ``"pbr"``: physically based colours, as those of cameras with ``shading="pbr"``; or ``"path"``:
-        the same by path tracing, on all CPUs. Depth and segmentation are the same."""
+        """``"classic"``, the default: MuJoCo's light model; ``"pbr"``: physically based colours, as those of cameras with
+        ``shading="pbr"``; or ``"path"``: the same by path tracing, on all CPUs. Depth and segmentation are the same."""
         return self._shading
 
     @shading.setter
@@ -245,7 +250,8 @@ class Renderer:
 
     @property
     def environment(self) -> str:
-        """With ``shading="pbr"`` or ``"path"``: the light from the surroundings, as the option `environment` of cameras; ``"model"`` by default."""
+        """With ``shading="pbr"`` or ``"path"``: the light from the surroundings, as the option `environment` of cameras;
+        ``"model"`` by default."""
         return self._environment
 
     @environment.setter
@@ -308,7 +314,10 @@ class Renderer:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            gl = "; there is no OpenGL. Call reload() after a change of the model's textures, meshes or height fields (mjr_uploadTexture ...)"
+            gl = (
+                "; there is no OpenGL. Call reload() after a change of the model's textures, meshes or height "
+                "fields (mjr_uploadTexture ...)"
+            )
             raise AttributeError(f"Renderer has no attribute '{name}'{gl if name in ('_mjr_context', '_gl_context') else ''}")
 
     def _check_sizes(self, model: mujoco.MjModel, what: str) -> None:
@@ -341,7 +350,8 @@ class Renderer:
 
         Args:
             data: data of the renderer's model.
-            camera: id or name of a camera of the model, -1 for the default free camera, or an ``MjvCamera`` (free, fixed or tracking).
+            camera: id or name of a camera of the model, -1 for the default free camera, or an ``MjvCamera`` (free, fixed or
+                tracking).
             scene_option: visibility of groups and elements; None for MuJoCo's defaults.
 
         MuJoCo draws no geoms of a `data` for which ``mj_forward`` was never called; the first such call warns.
@@ -372,7 +382,8 @@ class Renderer:
         mujoco.mjv_updateCamera(self._model, data, view, self._scene)
         if any(camera.frustum_near < 1e-15 for camera in self._scene.camera):  # for which mjv_updateScene ends the process
             raise ValueError(
-                "Renderer: the near plane of the scene's camera is at 0: set model.vis.map.znear, or renderer.scene.camera for mjCAMERA_USER"
+                "Renderer: the near plane of the scene's camera is at 0: set model.vis.map.znear, or "
+                "renderer.scene.camera for mjCAMERA_USER"
             )
         mujoco.mjv_updateScene(
             self._model, data, scene_option or self._scene_option, None, view, mujoco.mjtCatBit.mjCAT_ALL.value, self._scene
@@ -385,14 +396,16 @@ class Renderer:
             out: array for the image, of the shape below; its type is cast to if necessary.
 
         Returns:
-            A new array, or `out`: rgb uint8 [H, W, 3]; with depth rendering float32 [H, W], distance to the camera plane in m, the far
-            plane's where nothing is seen; with segmentation rendering int32 [H, W, 2], object id and type, (-1, -1) where nothing is seen.
+            A new array, or `out`: rgb uint8 [H, W, 3]; with depth rendering float32 [H, W], distance to the camera plane in m,
+            the far plane's where nothing is seen; with segmentation rendering int32 [H, W, 2], object id and type, (-1, -1) where
+            nothing is seen.
 
         Before the first ``update_scene`` the image is black, as MuJoCo's, and the first call warns.
 
         Raises:
             RuntimeError: after ``close()``, or if another thread is using the renderer.
-            ValueError: if the shape of `out` is wrong, if a pose is not finite, or if the scene contains something that cannot be drawn.
+            ValueError: if the shape of `out` is wrong, if a pose is not finite, or if the scene contains something that cannot be
+                drawn.
         """
         with self._guard:
             self._opened()
@@ -413,7 +426,8 @@ class Renderer:
     def render_images(
         self, kinds: Sequence[str] = ("rgb", "depth", "segmentation"), *, height: int | None = None, width: int | None = None
     ) -> dict[str, np.ndarray]:
-        """Renders several images of the scene at once: ``rgb``, ``depth`` and ``segmentation``, with the shapes and types of ``render()``.
+        """Renders several images of the scene at once: ``rgb``, ``depth`` and ``segmentation``, with the shapes and types of
+        ``render()``.
 
         Args:
             kinds: the images.
@@ -504,8 +518,8 @@ class Renderer:
     def reload(self) -> None:
         """Makes the next image show the current textures, height fields and meshes of the model.
 
-        Not needed after changes of whole textures, height fields or meshes, which are detected; a change of a small part of a large one
-        may be missed.
+        Not needed after changes of whole textures, height fields or meshes, which are detected; a change of a small part of a
+        large one may be missed.
         """
         self._opened().reload()
         self.shading = self._shading  # a skybox or an image light may have changed
@@ -578,7 +592,8 @@ class Renderer:
                 raise ValueError(f"Renderer: scene.{name} = {getattr(scene, name)} is not supported")
 
     def close(self) -> None:
-        """Frees the renderer's memory, after the calls of other threads. The renderer is also a context manager that does this at its end."""
+        """Frees the renderer's memory, after the calls of other threads. The renderer is also a context manager that does this at
+        its end."""
         with self._guard.lock:
             self._native = None
         with self._batch_guard.lock:

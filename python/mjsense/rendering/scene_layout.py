@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finds where the installed MuJoCo keeps the fields of its abstract scene.
 
-``mjvGeom``, ``mjvLight`` and ``mjvGLCamera`` differ between versions of MuJoCo. Their layout is measured: each field is written through
-MuJoCo's Python bindings, and the bytes of the struct that change are the field's place. Offsets are relative to the struct's field ``pos``.
+``mjvGeom``, ``mjvLight`` and ``mjvGLCamera`` differ between versions of MuJoCo. Their layout is measured: each field is written
+through MuJoCo's Python bindings, and the bytes of the struct that change are the field's place. Offsets are relative to the
+struct's field ``pos``.
 """
 
 from __future__ import annotations

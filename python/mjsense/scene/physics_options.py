@@ -125,9 +125,9 @@ class Options:
         sim.randomize("opt.wind", wind, world_ids=[0, 3])       # in some
         sim.options.disableflags = ("contact", "gravity")       # words, or MuJoCo's bits
 
-    Reading gives the values of all worlds, ``[B, ...]``, read-only. Every change takes effect at once: derived quantities and sensors
-    follow, and the next step uses it. Options stay until they are written again; a reset keeps them. A task or policy may set them,
-    ``sample()`` for an episode; recordings store them for the replay.
+    Reading gives the values of all worlds, ``[B, ...]``, read-only. Every change takes effect at once: derived quantities and
+    sensors follow, and the next step uses it. Options stay until they are written again; a reset keeps them. A task or policy may
+    set them, ``sample()`` for an episode; recordings store them for the replay.
     """
 
     gravity = _Option("Gravitational acceleration in the world frame, m/s^2 [B, 3].")
@@ -166,8 +166,9 @@ class Options:
 
     @property
     def timestep(self) -> float:
-        """Duration of a physics step, s, the same in all worlds. It can change while all worlds are at the beginning of an episode, unless
-        a sensor's noise, delays or ray times were resolved to steps, and not in environments and recordings, whose robots have control periods."""
+        """Duration of a physics step, s, the same in all worlds. It can change while all worlds are at the beginning of an
+        episode, unless a sensor's noise, delays or ray times were resolved to steps, and not in environments and recordings,
+        whose robots have control periods."""
         return self._sim.physics_dt
 
     @timestep.setter

@@ -66,7 +66,8 @@ def refuse(model: Any, field: str) -> NoReturn:
     else:
         how = "edit the spec before the scene is compiled, SceneCfg(spec_fn=function)"
     raise AttributeError(
-        f"the model is read-only, and a write to '{field}' would not reach the simulation: use {how}; copy.copy(model) makes a model of your own"
+        f"the model is read-only, and a write to '{field}' would not reach the simulation: use {how}; "
+        "copy.copy(model) makes a model of your own"
     )
 
 

@@ -79,7 +79,8 @@ class Scene(KnownAttributes):
         self._finish()
 
     def _prepare(self, cfg: SceneCfg) -> tuple[list[Any], Callable[[], None]]:
-        """Returns the arguments of the C++ scene in addition to the configuration and the spec: its sensors and the final edit."""
+        """Returns the arguments of the C++ scene in addition to the configuration and the spec: its sensors and the final
+        edit."""
         cfg.__post_init__()  # it may have been changed after its construction
         self.cfg = cfg
         self.spec = cfg._base_spec()
@@ -253,7 +254,8 @@ class Scene(KnownAttributes):
 
     @cached_property
     def model(self) -> mujoco.MjModel:
-        """A read-only copy of the compiled model, for look-ups and MuJoCo's functions. ``copy.copy(scene.model)`` can be changed."""
+        """A read-only copy of the compiled model, for look-ups and MuJoCo's functions. ``copy.copy(scene.model)`` can be
+        changed."""
         return read_only(mujoco_views.model_of(self._core.copy_model()))
 
     def to_xml(self) -> str:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How mjsense calls a sensor: ``compute(sim, world_ids)`` and the methods of its life. Adapters call classes that are written for other
-libraries in the same way."""
+"""How mjsense calls a sensor: ``compute(sim, world_ids)`` and the methods of its life. Adapters call classes that are written for
+other libraries in the same way."""
 
 from __future__ import annotations
 

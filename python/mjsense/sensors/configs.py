@@ -347,15 +347,21 @@ class CameraSensorCfg(SensorCfg):
     the other kinds of shading."""
     exposure: float = 8.0
     """Exposure in EV at ISO 100; 1 more halves the brightness."""
-    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "neutral"
+    exposure_mode: Literal["fixed", "auto"] = "fixed"
+    """auto: a meter chooses the exposure of each world, instead of ``exposure``."""
+    exposure_time_constant: float = 0.5
+    """Time in which the automatic exposure covers 63 % of a change; 0: it follows at once. [s]"""
+    imager: Literal["none", "d435", "zed_mini"] = "none"
+    """Photon and read noise, vignetting and quantisation of the colour sensor of a real camera."""
+    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "filmic"
     """From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear: clips; agx:
     bright colours become white."""
     white_balance: float = 6504.0
     """Colour temperature of the light that appears white. [K]"""
     environment: str = "model"
     """Light from the surroundings. model: the model's image light, else studio; auto: its image light, else its skybox,
-    else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr file, which is also the
-    background."""
+    else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr or .exr file, which is also
+    the background."""
     environment_intensity: float = 1.0
     """Factor of the light from the surroundings."""
     environment_rotation: float = 0.0
@@ -368,6 +374,8 @@ class CameraSensorCfg(SensorCfg):
     """Intrinsic parameters; they replace fovy and the parameters of the MJCF."""
     distortion: LensDistortion = field(default_factory=LensDistortion)
     """Lens distortion; the image is not rectified."""
+    imager_values: ImagerCfg | None = None
+    """An image sensor of other values than those of ``imager``."""
     depth_noise: Literal["none", "d405", "d435"] = "none"
     """Error model of a stereo camera, applied to ``depth``; the other fields stay exact."""
     renderer: Literal["rays", "opengl"] = "rays"
@@ -390,6 +398,24 @@ class CameraIntrinsics(config_methods.Config):
     """Principal point, from the left border. [pixels]"""
     cy: float
     """Principal point, from the top border. [pixels]"""
+
+
+@dataclass(frozen=True)
+class ImagerCfg(config_methods.Config):
+    """The image sensor of a camera: noise, quantisation and vignetting."""
+
+    full_well: float = 4300.0
+    """Electrons of a saturated pixel. [electrons]"""
+    read_noise: float = 1.7
+    """Standard deviation of the noise of reading a pixel. [electrons]"""
+    bits: int = 10
+    """Bits of a value of the analogue-to-digital converter."""
+    f_number: float = 2.0
+    """Focal length divided by the diameter of the aperture."""
+    exposure_time: float = 0.03333333333333333
+    """Longest exposure; darker images than it allows are amplified. [s]"""
+    vignetting: float = 0.0
+    """Share of natural vignetting, cos^4 of the angle to the optical axis, that is not corrected."""
 
 
 @dataclass(frozen=True)
@@ -903,7 +929,10 @@ class SceneVaryCfg(config_methods.Config):
     angle: float = 0.0
     """light: maximum change of its direction; body: half width of the rotation about the vertical, degrees."""
     textures: Sequence[str] = ()
-    """material: full names of the textures to choose from."""
+    """material: full names of the textures to choose from. Where there is a texture <name>_normals, it is the normal
+    map."""
+    shows: str | None = None
+    """material: full name of the texture that it emits in physically based images, such as the view from a window."""
     optional: bool = False
     """Ignore the entry if nothing matches its pattern, which is an error otherwise. Entries that a scene inherits are
     optional."""
@@ -955,12 +984,12 @@ def replace(cfg: Any, **changes: Any) -> Any:
 
 __all__ = [
     "BuiltinSensorCfg", "CameraIntrinsics", "CameraSensorCfg", "CameraVizCfg", "ContactMatch", "ContactSensorCfg",
-    "ContactVizCfg", "EffectSensorCfg", "EntityCfg", "GridPatternCfg", "ImuAxis", "ImuModel", "ImuSensorCfg",
-    "LensDistortion", "LidarSensorCfg", "MujocoCfg", "ObjRef", "PinholeCameraPatternCfg", "RayCastSensorCfg",
-    "RayCastVizCfg", "RingPatternCfg", "SceneCfg", "SceneEntityCfg", "SceneFileCfg", "SceneHeadlightCfg",
-    "SceneMoodCfg", "SceneObjectCfg", "SceneRegionCfg", "SceneRobotCfg", "SceneSkyCfg", "SceneVaryCfg", "SensorCfg",
-    "SpinningScanCfg", "SubTerrainCfg", "TableScanCfg", "TerrainCfg", "TerrainHeightSensorCfg", "UserPatternCfg",
-    "replace",
-]  # fmt: skip
+    "ContactVizCfg", "EffectSensorCfg", "EntityCfg", "GridPatternCfg", "ImagerCfg", "ImuAxis", "ImuModel",
+    "ImuSensorCfg", "LensDistortion", "LidarSensorCfg", "MujocoCfg", "ObjRef", "PinholeCameraPatternCfg",
+    "RayCastSensorCfg", "RayCastVizCfg", "RingPatternCfg", "SceneCfg", "SceneEntityCfg", "SceneFileCfg",
+    "SceneHeadlightCfg", "SceneMoodCfg", "SceneObjectCfg", "SceneRegionCfg", "SceneRobotCfg", "SceneSkyCfg",
+    "SceneVaryCfg", "SensorCfg", "SpinningScanCfg", "SubTerrainCfg", "TableScanCfg", "TerrainCfg",
+    "TerrainHeightSensorCfg", "UserPatternCfg", "replace",
+]
 
 show_field_docs(__name__)

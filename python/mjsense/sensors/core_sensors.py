@@ -209,7 +209,8 @@ class EnvStatesSensor(CoreSensor):
     Fields ``actors/<body>`` float32 ``[B, 13]`` (m, wxyz, m/s, rad/s: MuJoCo's qpos and qvel of the free joint);
     ``articulations/<name>`` float64 ``[B, nq + nv]`` of the robot and of every body with inner joints; and, on request,
     MolmoSpaces' ``articulations/<articulation>`` float32 ``[B, length]`` (qpos of all groups, then their qvel, then zeros). In an
-    environment ``present/<body>`` bool ``[B]`` of each object that can be absent from an episode; the row of an absent object is zeros.
+    environment ``present/<body>`` bool ``[B]`` of each object that can be absent from an episode; the row of an absent object is
+    zeros.
     """
 
     def __init__(

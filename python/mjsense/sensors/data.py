@@ -177,6 +177,6 @@ DATA_OF_KIND: dict[str, type] = {
 
 __all__ = [
     "CameraData", "ContactData", "DATA_OF_KIND", "ImuData", "RayCastData", "SensorData", "make_data",
-]  # fmt: skip
+]
 
 show_field_docs(__name__)

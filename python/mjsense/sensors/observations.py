@@ -28,7 +28,8 @@ def projected_gravity_from_sensor(env: Any, sensor_name: str) -> np.ndarray:
 
 @checked
 def height_scan(env: Any, sensor_name: str, offset: float = 0.0, miss_value: float | None = None) -> np.ndarray:
-    """Height of each ray's frame above the hit minus `offset`, ``[B, R]`` m; misses are `miss_value` (by default max_distance)."""
+    """Height of each ray's frame above the hit minus `offset`, ``[B, R]`` m; misses are `miss_value` (by default
+    max_distance)."""
     sensor = env.scene[sensor_name]
     data = sensor.data
     if miss_value is None:

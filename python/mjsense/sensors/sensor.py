@@ -42,16 +42,16 @@ def _plain(value: Any) -> Any:
 class Sensor(Generic[T]):
     """Base class of sensors written in Python; ``T`` in ``Sensor[T]`` is the type of ``data``.
 
-    ``compute(sim)`` returns the values of all worlds, ``[B, ...]``; ``compute(sim, world_ids)`` returns those of the given worlds, in
-    order. One instance serves all worlds and stores its state per world.
+    ``compute(sim)`` returns the values of all worlds, ``[B, ...]``; ``compute(sim, world_ids)`` returns those of the given
+    worlds, in order. One instance serves all worlds and stores its state per world.
 
     Classes with the methods of other libraries work too, if they have no ``compute``:
 
     - ``_compute_data()`` equals ``compute(sim)`` without an argument (as in mjlab);
     - ``get_observation(env, task, batch_index=0)`` returns the value of one world (as in MolmoSpaces). `env` is
-      :attr:`mjsense.Simulation.env`; `task` is None except in recordings and environments. There is one instance per world: the given
-      object belongs to world 0, and the others are deep copies that are created when the sensor is added to its simulation. Its
-      ``reset()`` has no arguments. (A ``reset(world_ids)`` makes one instance serve all worlds here too.)
+      :attr:`mjsense.Simulation.env`; `task` is None except in recordings and environments. There is one instance per world: the
+      given object belongs to world 0, and the others are deep copies that are created when the sensor is added to its simulation.
+      Its ``reset()`` has no arguments. (A ``reset(world_ids)`` makes one instance serve all worlds here too.)
 
     The value is computed once per state, when it is read. With an ``observation_space``, rows are stored in arrays of its dtype
     and shape, from which suites and recordings read. A value with another dtype or shape, or outside the bounds, is an error;

@@ -49,9 +49,10 @@ _WRITTEN_STATE = -2
 class Attached(KnownAttributes):
     """Sensors over data that the user's program steps; made by :func:`attach`.
 
-    ``attached["front"]`` is the sensor of that name, as ``scene["front"]`` is in a :class:`mjsense.Simulation`; world ``i`` is ``data[i]``.
-    The sensors show the states at the last :meth:`update` or :meth:`reset`. The user's model and data are never written. A call of
-    :meth:`update`, :meth:`reset`, :meth:`reload` or :meth:`replace` during one of another thread is an error; :meth:`close` waits for it.
+    ``attached["front"]`` is the sensor of that name, as ``scene["front"]`` is in a :class:`mjsense.Simulation`; world ``i`` is
+    ``data[i]``. The sensors show the states at the last :meth:`update` or :meth:`reset`. The user's model and data are never
+    written. A call of :meth:`update`, :meth:`reset`, :meth:`reload` or :meth:`replace` during one of another thread is an error;
+    :meth:`close` waits for it.
     """
 
     def __init__(
@@ -163,7 +164,8 @@ class Attached(KnownAttributes):
             if (now := self.datas[world].time) != before:
                 self._warned = True
                 warnings.warn(
-                    f"attached sensors show data[{world}] at {before:g} s, and it is at {now:g} s: call update() after mj_step, or reset() when an "
+                    f"attached sensors show data[{world}] at {before:g} s, and it is at {now:g} s: call update() "
+                    "after mj_step, or reset() when an "
                     "episode has begun",
                     RuntimeWarning,
                     stacklevel=4,
@@ -182,7 +184,8 @@ class Attached(KnownAttributes):
 
     @property
     def simulation(self) -> Simulation:
-        """The copy of the worlds in which the sensors are computed, for :class:`mjsense.SensorSuite` and drawing. Do not step it."""
+        """The copy of the worlds in which the sensors are computed, for :class:`mjsense.SensorSuite` and drawing. Do not step
+        it."""
         return self._sim
 
     @property
@@ -194,9 +197,9 @@ class Attached(KnownAttributes):
     def update(self) -> None:
         """Makes the sensors show the current states of the data.
 
-        Air time, history, delay and everything else that remembers advances by the time by which ``data.time`` has advanced, in whole time
-        steps. A sensor with memory sees the states at which this is called: call it after every ``mj_step`` if air time must notice
-        contacts of a single step.
+        Air time, history, delay and everything else that remembers advances by the time by which ``data.time`` has advanced, in
+        whole time steps. A sensor with memory sees the states at which this is called: call it after every ``mj_step`` if air
+        time must notice contacts of a single step.
 
         Raises:
             ValueError: If ``data.time`` has run backwards (call :meth:`reset`), or if a state is not finite.
@@ -214,7 +217,8 @@ class Attached(KnownAttributes):
             steps = (now - before) / timestep
             if steps < -1e-6:
                 raise ValueError(
-                    f"update(): the time of data[{world}] went back from {before:g} s to {now:g} s: call reset([{world}]) when an episode begins"
+                    f"update(): the time of data[{world}] went back from {before:g} s to {now:g} s: call "
+                    f"reset([{world}]) when an episode begins"
                 )
             # An edited state at the same time has 0 steps. A time between two steps counts as the next one.
             count = max(round(steps), int(steps > 1e-6))
@@ -246,8 +250,8 @@ class Attached(KnownAttributes):
         """Call after the model was edited (masses, sizes, friction, colours, options ...): the sensors follow.
 
         Raises:
-            ValueError: If a change cannot be followed, which then needs a new :func:`attach`: meshes, height fields, textures, the time step,
-                and the structure of the model.
+            ValueError: If a change cannot be followed, which then needs a new :func:`attach`: meshes, height fields, textures,
+                the time step, and the structure of the model.
         """
         self._read_models("reload()")
         self._sim.forward()
@@ -274,7 +278,8 @@ class Attached(KnownAttributes):
         self.reset([world])
 
     def add(self, sensor: Any) -> Any:
-        """Adds a sensor that needs no element in the model: a user-defined one, or one such as :class:`mjsense.sensors.PoseSensor`. Returns it."""
+        """Adds a sensor that needs no element in the model: a user-defined one, or one such as
+        :class:`mjsense.sensors.PoseSensor`. Returns it."""
         return self._sim.add(sensor)
 
     # ---------------------------------------------------------------------------------------------------------- states
@@ -306,7 +311,8 @@ class Attached(KnownAttributes):
     def _changes(
         self, model: Any, known: dict[str, np.ndarray], what: str
     ) -> tuple[dict[str, np.ndarray], list[tuple[np.ndarray, np.ndarray]]]:
-        """Returns the new `known`, and the rows of all worlds with the bytes to write. Raises ValueError for changes that cannot be written."""
+        """Returns the new `known`, and the rows of all worlds with the bytes to write. Raises ValueError for changes that cannot
+        be written."""
         sim = self._sim
         values, rows = dict(known), []
         copy = model if self._same_series else foreign_model.copy_of(model)
@@ -340,7 +346,8 @@ class Attached(KnownAttributes):
         return list(range(self.num_worlds)) if found is None else found
 
     def _rows(self, worlds: Sequence[int]) -> tuple[np.ndarray, list[float]]:
-        """The states of these data in the layout of ``simulation.state``, and their times. Raises ValueError if one is not finite."""
+        """The states of these data in the layout of ``simulation.state``, and their times. Raises ValueError if one is not
+        finite."""
         rows = np.array(self._sim.state[list(worlds)])
         for row, world in zip(rows, worlds):
             data = self.datas[world]
@@ -384,22 +391,24 @@ def attach(
 
     Sensors show the states at the last update. The first ``attached["front"]`` after a step without an update warns.
 
-    Works with every MuJoCo from 3.3 on. Each update copies the state and computes from it what sensors read, so that measurements belong to
-    the current state, unlike the fields of an MjData after ``mj_step``, which are one step behind.
+    Works with every MuJoCo from 3.3 on. Each update copies the state and computes from it what sensors read, so that measurements
+    belong to the current state, unlike the fields of an MjData after ``mj_step``, which are one step behind.
 
     Args:
-        model: The ``mujoco.MjModel``, or robosuite's or dm_control's wrapper of it, or a list with one of the same structure for each world.
-            It is not changed.
+        model: The ``mujoco.MjModel``, or robosuite's or dm_control's wrapper of it, or a list with one of the same structure for
+            each world. It is not changed.
         data: A ``mujoco.MjData`` of the model, or a list with one for each world.
-        sensors: Sensor configurations and :class:`mjsense.Sensor` objects, as in :class:`mjsense.SceneCfg`. Names are those of the model;
-            an element without a name has the name of its kind and number, ``geom_3``. MuJoCo's sensors of the model are attached, too.
+        sensors: Sensor configurations and :class:`mjsense.Sensor` objects, as in :class:`mjsense.SceneCfg`. Names are those of
+            the model; an element without a name has the name of its kind and number, ``geom_3``. MuJoCo's sensors of the model
+            are attached, too.
         decimation: Number of ``mj_step`` calls between two updates: the control period of sensors that have one.
         threads: Number of threads; 0: one per CPU that is available to this process.
         seed: Seed of the random numbers (noise, delays).
 
     Raises:
         TypeError: If ``model`` or ``data`` is not one of MuJoCo's.
-        ValueError: If a data belongs to another model, or a sensor needs an element that the model lacks; the message says what to add.
+        ValueError: If a data belongs to another model, or a sensor needs an element that the model lacks; the message says what
+            to add.
     """
     return Attached(model, data, sensors, decimation=decimation, threads=threads, seed=seed)
 

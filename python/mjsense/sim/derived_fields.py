@@ -42,8 +42,8 @@ class DerivedFields:
     cam_xpos: np.ndarray
     cam_xmat: np.ndarray
     subtree_com: np.ndarray
-    """Centre of mass of each body and its descendants, m, world frame ``[B, nbody, 3]``. In a scene with terrain body 1 is the terrain: use
-    ``sim.model.body("robot/base").id``."""
+    """Centre of mass of each body and its descendants, m, world frame ``[B, nbody, 3]``. In a scene with terrain body 1 is the
+    terrain: use ``sim.model.body("robot/base").id``."""
     cvel: np.ndarray
     qacc: np.ndarray
     qfrc_bias: np.ndarray

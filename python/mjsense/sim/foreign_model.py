@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Models of the environment's MuJoCo, of any series, for the libmujoco that mjsense uses.
 
-A model of another series is copied array by array. Fields that the other series does not have get the value that means what was always so
-there, or are computed from fields that it has. Fields of an unknown name or shape are refused.
+A model of another series is copied array by array. Fields that the other series does not have get the value that means what was
+always so there, or are computed from fields that it has. Fields of an unknown name or shape are refused.
 """
 
 from __future__ import annotations
@@ -43,7 +43,8 @@ _DEFAULTS: dict[str, Any] = {
 """Values of fields that older series lack; all others are 0."""
 
 _GONE = ("flex", "cam_orthographic", "light_directional")
-"""Beginnings of the names of arrays that only older series have. Models with flexes are refused; the content of the others is in new fields."""
+"""Beginnings of the names of arrays that only older series have. Models with flexes are refused; the content of the others is in
+new fields."""
 
 
 def package_of(model: Any) -> Any:
@@ -81,7 +82,8 @@ def copy_of(model: Any) -> Any:
     for size, what in (("nflex", "flexes"), ("nplugin", "plugins"), ("nhistory", "histories of sensors or actuators")):
         if getattr(model, size, 0):
             raise ValueError(
-                f"attach(): the model has {what}, which cannot be attached from MuJoCo {version}: they need {libmujoco.REQUIREMENT}"
+                f"attach(): the model has {what}, which cannot be attached from MuJoCo {version}: they need "
+                f"{libmujoco.REQUIREMENT}"
             )
     view = mujoco_views.MjModelView(_core.OwnedModel.take(_core.make_model(_sizes(model))))
     _refuse_unknown(model, view, version)
@@ -122,7 +124,8 @@ def _refuse_unknown(model: Any, view: Any, version: str) -> None:
             value = getattr(model, name, None)
             if isinstance(value, np.ndarray) and value.any():
                 raise ValueError(
-                    f"attach(): the model of MuJoCo {version} has {name}, which mjsense's MuJoCo {'.'.join(map(str, libmujoco.SERIES))} does not know"
+                    f"attach(): the model of MuJoCo {version} has {name}, which mjsense's MuJoCo "
+                    f"{'.'.join(map(str, libmujoco.SERIES))} does not know"
                 )
 
 
@@ -166,8 +169,8 @@ def _tendon_dofs(model: Any) -> list[list[int]]:
 def _sparse_matrices(model: Any) -> dict[str, np.ndarray]:
     """The structure of the model's sparse matrices, which models have from 3.3.6 on.
 
-    M is the lower triangle of the inertia matrix without the zeros of simple degrees of freedom, D the whole matrix with them. B has the
-    degrees of freedom of each body, its ancestors and its descendants.
+    M is the lower triangle of the inertia matrix without the zeros of simple degrees of freedom, D the whole matrix with them. B
+    has the degrees of freedom of each body, its ancestors and its descendants.
     """
 
     def chain(start: int, parents: np.ndarray, root: int) -> list[int]:

@@ -263,7 +263,8 @@ class Simulation(KnownAttributes, metaclass=ABCMeta):  # WarpSimulation is regis
 
     @property
     def state(self) -> NDArray[np.float64]:
-        """The complete integration state (mjSTATE_INTEGRATION), float64 ``[B, nstate]``. The array is live; copy it to keep it."""
+        """The complete integration state (mjSTATE_INTEGRATION), float64 ``[B, nstate]``. The array is live; copy it to keep
+        it."""
         if "state" not in self._views or self._core.closed:
             self._views["state"] = self._core.state()
         return self._views["state"].view()
@@ -294,8 +295,8 @@ class Simulation(KnownAttributes, metaclass=ABCMeta):  # WarpSimulation is regis
 
     @property
     def time(self) -> NDArray[np.float64]:
-        """Simulation time of each world, s, ``[B]``, a copy. It is 0 after a reset, or the keyframe's time, and ``set_state(time=...)``
-        changes it. Unless it began elsewhere than at 0, it is an exact multiple of the substep."""
+        """Simulation time of each world, s, ``[B]``, a copy. It is 0 after a reset, or the keyframe's time, and
+        ``set_state(time=...)`` changes it. Unless it began elsewhere than at 0, it is an exact multiple of the substep."""
         counted, summed = np.array(self._core.times()), self._component("time")
         # MuJoCo adds the timestep in each step, and each sum is rounded. A larger difference was written.
         rounding = np.finfo(float).eps * counted * (counted / self.physics_dt)
@@ -320,20 +321,24 @@ class Simulation(KnownAttributes, metaclass=ABCMeta):  # WarpSimulation is regis
 
     @property
     def model(self) -> mujoco.MjModel:
-        """A read-only copy of the simulated model, for look-ups and MuJoCo's functions. It does not contain values that differ between
-        worlds: see :meth:`model_of`; and :attr:`options` and :meth:`randomize` for changes. ``copy.copy(sim.model)`` can be changed."""
+        """A read-only copy of the simulated model, for look-ups and MuJoCo's functions. It does not contain values that differ
+        between
+        worlds: see :meth:`model_of`; and :attr:`options` and :meth:`randomize` for changes. ``copy.copy(sim.model)`` can be
+        changed."""
         return self._models.shared
 
     @property
     def options(self) -> Options:
-        """Gravity, wind, flags and the other physics options of the running simulation: ``sim.options.gravity = (0, 0, -1.62)``."""
+        """Gravity, wind, flags and the other physics options of the running simulation:
+        ``sim.options.gravity = (0, 0, -1.62)``."""
         return Options(self)
 
     def _set_timestep(self, seconds: float) -> None:
         """See :attr:`Options.timestep`."""
         if self._stepped_elsewhere:
             raise ValueError(
-                "timestep: it cannot change in environments and recordings, whose control periods are multiples of it; set sim_dt_ms"
+                "timestep: it cannot change in environments and recordings, whose control periods are multiples of "
+                "it; set sim_dt_ms"
             )
         self._core.set_timestep(seconds)
         self.physics_dt, self.step_dt = self._core.physics_dt, self._core.step_dt
@@ -361,7 +366,8 @@ class Simulation(KnownAttributes, metaclass=ABCMeta):  # WarpSimulation is regis
         return self._core.seed
 
     def randomize(self, field: str, values: Any, world_ids: Sequence[int] | None = None) -> None:
-        """Sets a field of the model per world: ``randomize("geom_friction", values)``, or an option, ``randomize("opt.gravity", values)``.
+        """Sets a field of the model per world: ``randomize("geom_friction", values)``, or an option,
+        ``randomize("opt.gravity", values)``.
 
         Values have the shape ``[worlds, ...]`` or broadcast to it. Quantities that MuJoCo derives from the field, rays and images
         follow. Raises ValueError for fields that cannot differ between worlds (meshes, height fields, texture pixels), for a
@@ -395,8 +401,8 @@ class Simulation(KnownAttributes, metaclass=ABCMeta):  # WarpSimulation is regis
     def add(self, sensor: Any) -> Any:
         """Adds a sensor that is not part of the scene, for use in suites, and returns it.
 
-        The sensor is a user-defined one, one of the core suite (such as :class:`mjsense.sensors.PoseSensor`), or an object of another
-        library with a ``uuid`` and ``get_observation(env, task, batch_index)``; the latter is wrapped, and the wrapper is
+        The sensor is a user-defined one, one of the core suite (such as :class:`mjsense.sensors.PoseSensor`), or an object of
+        another library with a ``uuid`` and ``get_observation(env, task, batch_index)``; the latter is wrapped, and the wrapper is
         returned.
         """
         sensor = as_sensor(sensor)

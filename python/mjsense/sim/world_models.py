@@ -113,7 +113,8 @@ class WorldModels:
         return True
 
     def _changed(self, worlds: np.ndarray, has_derived: bool) -> None:
-        """``has_derived``: MuJoCo derives values from what was written. It would give all meshes the radius that the shared model has."""
+        """``has_derived``: MuJoCo derives values from what was written. It would give all meshes the radius that the shared model
+        has."""
         meshes = np.flatnonzero(self.shared.geom_type == mujoco_names.Geom.MESH) if has_derived else []
         radii = self.field("geom_rbound")[:, meshes] if len(meshes) else None
         try:

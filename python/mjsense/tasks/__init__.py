@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robot learning: tasks, robots and policies, environments of them, and recordings of their episodes. Modules are imported when one of
-their names is used."""
+"""Robot learning: tasks, robots and policies, environments of them, and recordings of their episodes. Modules are imported when
+one of their names is used."""
 
 from __future__ import annotations
 

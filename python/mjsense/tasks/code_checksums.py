@@ -45,7 +45,8 @@ def checksums(owner: Any, place: str, must_compare: bool = False) -> dict[str, s
             if must_compare:
                 what = "the code" if name == "code" else f"attribute '{name}'"
                 raise ValueError(
-                    f"cannot resume: {what} of the {place} has a {error}, which cannot be compared with that of the recording; give "
+                    f"cannot resume: {what} of the {place} has a {error}, which cannot be compared with that of the "
+                    "recording; give "
                     f"{type(owner).__name__} a method fingerprint() that returns a text of what its data depend on"
                 ) from None
             found[name] = f"a {error}, not compared"

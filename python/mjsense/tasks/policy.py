@@ -70,7 +70,8 @@ class Policy:
             ``[B, n]``, or ``[B, H, n]`` for the next ``H`` steps, or a dict: move group -> ``[B, k]`` or ``[B, H, k]`` (omitted
             groups hold their position), or ``"action"`` -> ``[B, n]``. The dict may also contain ``"done"`` and ``"success"``,
             ``[B]``: the episode ends after this step, and the policy's own verdict (NaN: none); and ``"hold"``, bool
-            ``[B]`` or ``[B, move groups]``: these groups hold their position. In a world whose commands are not finite, the episode ends as a failure.
+            ``[B]`` or ``[B, move groups]``: these groups hold their position. In a world whose commands are not finite, the
+            episode ends as a failure.
         """
         raise NotImplementedError(f"{type(self).__name__}: write act(obs)")
 

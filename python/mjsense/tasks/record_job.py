@@ -127,8 +127,8 @@ def job_result(
 
     Args:
         report: Called with the fields of a RecordProgress; with ``stop_on_signals`` also with the number of signals.
-        stop_on_signals: The first Ctrl-C or SIGTERM finishes the running episodes, the second discards them, the third ends the process.
-            Otherwise Ctrl-C discards them and raises KeyboardInterrupt.
+        stop_on_signals: The first Ctrl-C or SIGTERM finishes the running episodes, the second discards them, the third ends the
+            process. Otherwise Ctrl-C discards them and raises KeyboardInterrupt.
     """
     options = {**PARTS, **options, "out": str(options["out"])}
     objects = parts_of(options, sensors)

@@ -42,7 +42,10 @@ def record(
     shading: Literal["classic", "pbr", "path"] = "classic",
     samples_per_pixel: int = 64,
     exposure: float = 8.0,
-    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "neutral",
+    exposure_mode: Literal["fixed", "auto"] = "fixed",
+    exposure_time_constant: float = 0.5,
+    imager: Literal["none", "d435", "zed_mini"] = "none",
+    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "filmic",
     white_balance: float = 6504.0,
     environment: str = "model",
     environment_intensity: float = 1.0,
@@ -76,6 +79,7 @@ def record(
     shard: str = "",
     keep_failures: bool = False,
     replay: bool = True,
+    videos: bool = True,
     # end of options
     sensors: Iterable[Any] = (),
     format: str = "mjsense",
@@ -124,12 +128,15 @@ def record(
         samples_per_pixel: Paths per pixel with shading path; four times as many halve the noise. ``samples`` and
             ``shadow_samples`` are for the other kinds of shading.
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness.
+        exposure_mode: auto: a meter chooses the exposure of each world, instead of ``exposure``.
+        exposure_time_constant: Time in which the automatic exposure covers 63 % of a change; 0: it follows at once. [s]
+        imager: Photon and read noise, vignetting and quantisation of the colour sensor of a real camera.
         tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
             clips; agx: bright colours become white.
         white_balance: Colour temperature of the light that appears white. [K]
         environment: Light from the surroundings. model: the model's image light, else studio; auto: its image light,
-            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr
-            file, which is also the background.
+            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr or
+            .exr file, which is also the background.
         environment_intensity: Factor of the light from the surroundings.
         environment_rotation: Rotation of the surroundings about the world's z axis; a skybox in the background does not
             rotate. [degrees]
@@ -172,18 +179,23 @@ def record(
             directory; requires ``num_attempts``, the number of attempts of all shards.
         keep_failures: Keep failed episodes too.
         replay: Store what replay needs: the model, and the simulation's state and controls of every step.
+        videos: Store the images of the cameras as videos. Without them, ``mjsense render`` makes the videos of chosen
+            episodes afterwards.
         Others:
         sensors: Additional sensors: user-defined ones with an observation_space or is_dict, ones of the core suite, or ones
             written for MolmoSpaces. They are recorded with the suite. If a sensor fails in a world, that world's episode is
             rejected (see ``failures``); if it fails in every world from the first observation on, the recording ends with its
             error.
-        format: ``lerobot``, or another of :data:`mjsense.exporting.FORMATS` that is written while recording: write the recording as a LeRobot v3.0 data set, as :func:`mjsense.exporting.export_lerobot` does. The recording itself is made in ``OUT.recording`` and converted meanwhile.
+        format: ``lerobot``, or another of :data:`mjsense.exporting.FORMATS` that is written while recording: write the recording
+            as a LeRobot v3.0 data set, as :func:`mjsense.exporting.export_lerobot` does. The recording itself is made in
+            ``OUT.recording`` and converted meanwhile.
         map: With ``format="lerobot"``: features and cameras, as in :func:`mjsense.exporting.export_lerobot`.
-        trim_idle: With ``format="lerobot"``: leave out the steps in which nothing moves; by default in episodes whose task places an object.
-        keep_recording: With ``format="lerobot"``: keep ``OUT.recording``, which replay and rendering need. By default it is removed when the
-            data set is complete.
-        ray: ``local``, ``auto`` or the address of a Ray cluster: record on it, as :func:`mjsense.cluster.record_on_ray` does, which has more
-            options. ``out`` may then be an address such as ``s3://bucket/pick``.
+        trim_idle: With ``format="lerobot"``: leave out the steps in which nothing moves; by default in episodes whose task places
+            an object.
+        keep_recording: With ``format="lerobot"``: keep ``OUT.recording``, which replay and rendering need. By default it is
+            removed when the data set is complete.
+        ray: ``local``, ``auto`` or the address of a Ray cluster: record on it, as :func:`mjsense.cluster.record_on_ray` does,
+            which has more options. ``out`` may then be an address such as ``s3://bucket/pick``.
         progress: True: shows the progress on stderr. A function: called with the progress about ten times per second. By default
             True where stderr is a terminal or a notebook.
     """

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects that the package scene_synthesizer generates, as MJCF files.
 
-``python -m mjsense.tasks.synthesized_objects FOLDER`` writes them. ``mjsense assets install scene_synthesizer`` runs it with the package and
-its dependencies in a temporary folder. Pictures show the meshes of the package. Contacts are with boxes, a cylinder and convex
-hulls of sections of those meshes.
+``python -m mjsense.tasks.synthesized_objects FOLDER`` writes them. ``mjsense assets install scene_synthesizer`` runs it with the
+package and its dependencies in a temporary folder. Pictures show the meshes of the package. Contacts are with boxes, a cylinder
+and convex hulls of sections of those meshes.
 """
 
 from __future__ import annotations

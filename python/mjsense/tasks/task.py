@@ -241,7 +241,8 @@ class Task:
             array = on_host(value)
             if array.dtype.kind not in "biuf" or array.ndim not in (1, 2) or array.shape[0] != self.num_worlds:
                 raise ValueError(
-                    f"info '{key}' is {array.dtype}{list(array.shape)}; expected numbers [{self.num_worlds}] or [{self.num_worlds}, k]"
+                    f"info '{key}' is {array.dtype}{list(array.shape)}; expected numbers [{self.num_worlds}] or "
+                    f"[{self.num_worlds}, k]"
                 )
             kind = "i" if array.dtype.kind == "u" else array.dtype.kind
             width = array.shape[1] if array.ndim == 2 else 0
@@ -271,7 +272,8 @@ class Task:
 
 @checked
 class WorldState:
-    """The state of one world at the start of an episode, to be written by the task. Names are those of the model: ``"mug/mug"``."""
+    """The state of one world at the start of an episode, to be written by the task. Names are those of the model:
+    ``"mug/mug"``."""
 
     def __init__(self, sim: Any, world: int, episode: int) -> None:
         self._sim = sim

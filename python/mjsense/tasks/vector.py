@@ -46,14 +46,15 @@ class TaskVectorEnv(VectorEnv):
     - ``next_step``: the next step starts a new episode and ignores its action;
     - ``same_step``: the new episode has started when ``step`` returns; ``infos["final_obs"]`` and ``infos["final_info"]`` are
       those of the end of the old episode;
-    - ``disabled``: the world stops until ``reset(options={"reset_mask": mask})``. Until then each step returns the flags of its end
-      again, its last observation and the reward 0. A step in which no world can move raises ``gymnasium.error.ResetNeeded``.
+    - ``disabled``: the world stops until ``reset(options={"reset_mask": mask})``. Until then each step returns the flags of its
+      end again, its last observation and the reward 0. A step in which no world can move raises ``gymnasium.error.ResetNeeded``.
 
     ``infos["success"]`` is bool ``[num_envs]``; ``infos["_success"]`` is the mask of the worlds it applies to, as in gymnasium.
-    ``infos["episode_info"]`` says which episode each world plays: ``seed``, ``number`` and ``house``, by which ``record`` plays the same
-    episode, ``instruction`` and ``object``. (``infos["episode"]`` belongs to gymnasium's ``RecordEpisodeStatistics``.)
+    ``infos["episode_info"]`` says which episode each world plays: ``seed``, ``number`` and ``house``, by which ``record`` plays
+    the same episode, ``instruction`` and ``object``. (``infos["episode"]`` belongs to gymnasium's ``RecordEpisodeStatistics``.)
 
-    With ``make_vec(episodes=[3, 7, 12])`` the worlds play exactly these episodes, each once, in this order. A world that finds none left
+    With ``make_vec(episodes=[3, 7, 12])`` the worlds play exactly these episodes, each once, in this order. A world that finds
+    none left
     rests: its flags and its masks are False. When all are played, :attr:`all_played` is true, and ``step`` raises
     ``gymnasium.error.ResetNeeded``; ``reset()`` begins the list again.
     """
@@ -158,8 +159,9 @@ class TaskVectorEnv(VectorEnv):
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict]:
         """Starts a new episode in all worlds or in those of ``options["reset_mask"]``; with a seed, the first episodes of that
-        seed. An environment that has never received a seed plays other episodes than all others. With ``episodes``, a reset of all
-        worlds begins with the first of them. ``options["episodes"]`` gives the number of the episode of each of these worlds."""
+        seed. An environment that has never received a seed plays other episodes than all others. With ``episodes``, a reset of
+        all worlds begins with the first of them. ``options["episodes"]`` gives the number of the episode of each of these
+        worlds."""
         self._check_open()
         mask = np.ones(self.num_envs, bool)
         if options and "reset_mask" in options:
@@ -339,8 +341,8 @@ class TaskVectorEnv(VectorEnv):
         return commands.astype(np.float32)
 
     def planned_paths(self, world: int = 0) -> list[tuple[str, np.ndarray]]:
-        """The motion that the policy has planned in a world: the phase and the tool's positions, float64 ``[N, 3]`` m in the world
-        frame, of each part. Empty if the policy makes no plans."""
+        """The motion that the policy has planned in a world: the phase and the tool's positions, float64 ``[N, 3]`` m in the
+        world frame, of each part. Empty if the policy makes no plans."""
         self._check_open()
         if not 0 <= world < self.num_envs:
             raise ValueError(f"world {world}: must be in [0, {self.num_envs})")
@@ -484,7 +486,10 @@ def make_vec(
     shading: Literal["classic", "pbr", "path"] = "classic",
     samples_per_pixel: int = 64,
     exposure: float = 8.0,
-    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "neutral",
+    exposure_mode: Literal["fixed", "auto"] = "fixed",
+    exposure_time_constant: float = 0.5,
+    imager: Literal["none", "d435", "zed_mini"] = "none",
+    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "filmic",
     white_balance: float = 6504.0,
     environment: str = "model",
     environment_intensity: float = 1.0,
@@ -547,12 +552,15 @@ def make_vec(
         samples_per_pixel: Paths per pixel with shading path; four times as many halve the noise. ``samples`` and
             ``shadow_samples`` are for the other kinds of shading.
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness.
+        exposure_mode: auto: a meter chooses the exposure of each world, instead of ``exposure``.
+        exposure_time_constant: Time in which the automatic exposure covers 63 % of a change; 0: it follows at once. [s]
+        imager: Photon and read noise, vignetting and quantisation of the colour sensor of a real camera.
         tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
             clips; agx: bright colours become white.
         white_balance: Colour temperature of the light that appears white. [K]
         environment: Light from the surroundings. model: the model's image light, else studio; auto: its image light,
-            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr
-            file, which is also the background.
+            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr or
+            .exr file, which is also the background.
         environment_intensity: Factor of the light from the surroundings.
         environment_rotation: Rotation of the surroundings about the world's z axis; a skybox in the background does not
             rotate. [degrees]
@@ -571,8 +579,8 @@ def make_vec(
             any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of geoms that are
             deeper at the start do not count. [m]
         Others:
-        episodes: Numbers of the episodes to play, each once, instead of all from 0 on; see :class:`TaskVectorEnv`. They are the numbers
-            of ``record(first_attempt=...)``: the start depends on the seed and the number only.
+        episodes: Numbers of the episodes to play, each once, instead of all from 0 on; see :class:`TaskVectorEnv`. They are the
+            numbers of ``record(first_attempt=...)``: the start depends on the seed and the number only.
         use_sensors: Use the sensors of the task, the robot and the policy. False: only those in ``sensors``.
         autoreset_mode: next_step, same_step or disabled.
         render_mode: None or rgb_array.
@@ -611,7 +619,8 @@ def make_vec(
 
 
 def checked_episodes(place: str, episodes: Sequence[int]) -> list[int]:
-    """Numbers of episodes as a list. Raises ValueError if there are none, one is not a number from 0 on, or one is there twice."""
+    """Numbers of episodes as a list. Raises ValueError if there are none, one is not a number from 0 on, or one is there
+    twice."""
     numbers = list(episodes)
     for number in numbers:
         if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or not 0 <= number < 2**31:

@@ -30,18 +30,18 @@ def view(
 ) -> Viewer:
     """Shows worlds, a task or a recording in the browser.
 
-    The page has play, pause, step and speed, a choice of worlds, reset with a seed, the policy on and off, sliders of controls and
-    joints, sensors' shapes, camera images and curves of streams. A recording has a list of its episodes and a time line.
+    The page has play, pause, step and speed, a choice of worlds, reset with a seed, the policy on and off, sliders of controls
+    and joints, sensors' shapes, camera images and curves of streams. A recording has a list of its episodes and a time line.
 
     Args:
-        thing: A :class:`Simulation`, an environment, a :class:`Dataset`, the path of a recording or an MJCF, or the name or file of
-            a scene or a task.
+        thing: A :class:`Simulation`, an environment, a :class:`Dataset`, the path of a recording or an MJCF, or the name or file
+            of a scene or a task.
         world: World to show first.
         episode: Position of a recording's episode to show first.
         num_worlds: Number of worlds, if ``thing`` is a path or a name.
         seed: Seed of the first episode, if ``thing`` is a path or a name.
-        host: Address that the server is bound to; the default is reachable from this computer only. The page opens with the printed address
-            (:attr:`Viewer.url`), which contains a token.
+        host: Address that the server is bound to; the default is reachable from this computer only. The page opens with the
+            printed address (:attr:`Viewer.url`), which contains a token.
         port: Port of the server. If it is taken, the next free one is used; 0: any free one.
         block: Run until Ctrl-C or :meth:`Viewer.close`. False: return, and show the present state at every :meth:`Viewer.update`.
         open_browser: Open the page in the default browser.

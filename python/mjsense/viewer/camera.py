@@ -23,8 +23,8 @@ _FOV = float(np.radians(45))
 
 
 def first_view(model: Any, xpos: np.ndarray, xmat: np.ndarray) -> View:
-    """From the side of the first robot of an episode, in other models of the largest mechanism, where no wall is in the way. Models
-    without joints are shown by MuJoCo's free camera.
+    """From the side of the first robot of an episode, in other models of the largest mechanism, where no wall is in the way.
+    Models without joints are shown by MuJoCo's free camera.
 
     Args:
         xpos: Positions of the bodies. [m]

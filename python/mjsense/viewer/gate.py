@@ -22,7 +22,8 @@ _MAX_ANSWERS = 2**16  # bytes of answers to pings that a client has not taken
 _HEADERS = {"Cache-Control": "no-store", "Referrer-Policy": "no-referrer", "X-Content-Type-Options": "nosniff"}
 # The page is one file with its scripts. It may load nothing from elsewhere and connect to nothing else.
 _POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob: data:; style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob: data:; style-src 'unsafe-inline'; img-src "
+    "data: blob:; font-src data:; "
     "worker-src blob: data:; connect-src 'self' data: blob:{}; base-uri 'none'; form-action 'none'"
 )
 
@@ -44,7 +45,8 @@ def _quiet_log() -> logging.Logger:
 
 
 class Gate:
-    """The conditions under which a server accepts a connection: the token of the printed address, a Host that names this computer, and no other Origin."""
+    """The conditions under which a server accepts a connection: the token of the printed address, a Host that names this
+    computer, and no other Origin."""
 
     def __init__(self, listening: Listening) -> None:
         self._listening = listening
@@ -72,7 +74,10 @@ class Gate:
         """Why a request is refused; empty: it is not."""
         host, origin = headers.get_all("Host"), headers.get_all("Origin")
         if len(host) != 1 or not self._listening.answers_to(host[0]):
-            return "The address in the request is not one of this program. Open the address that it has printed, or start it with --host NAME."
+            return (
+                "The address in the request is not one of this program. Open the address that it has printed, "
+                "or start it with --host NAME."
+            )
         if not secrets.compare_digest(token.encode(errors="replace"), self._token.encode()):
             return "The address has no valid token. Open the whole address that the program has printed when it was started."
         own = [f"http://{host[0]}".lower(), f"https://{host[0]}".lower()]
@@ -98,7 +103,8 @@ class Gate:
 
 
 def _connection(gate: Gate) -> type[Any]:
-    """The class of connections, which passes on only messages that ``gate.check`` returns, and ends if its client stops reading."""
+    """The class of connections, which passes on only messages that ``gate.check`` returns, and ends if its client stops
+    reading."""
     from websockets.asyncio.server import ServerConnection
 
     class Connection(ServerConnection):

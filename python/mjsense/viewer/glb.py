@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Textured triangles as binary glTF 2.0.
 
-trimesh, on which viser depends, writes such files too, but not the same: it rounds the linear colour factors down to 8 bits, which makes
-dark colours up to 4 % darker, and encodes the JPEG of the texture once more.
+trimesh, on which viser depends, writes such files too, but not the same: it rounds the linear colour factors down to 8 bits,
+which makes dark colours up to 4 % darker, and encodes the JPEG of the texture once more.
 """
 
 from __future__ import annotations

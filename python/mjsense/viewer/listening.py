@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a page's server listens: a socket that is bound at once or is an error at once, and the names by which browsers may call it."""
+"""Where a page's server listens: a socket that is bound at once or is an error at once, and the names by which browsers may call
+it."""
 
 from __future__ import annotations
 
@@ -38,7 +39,8 @@ class Listening:
             found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
         except (OSError, UnicodeError) as error:
             raise ValueError(
-                f"host is '{plain(host, 60)}', which is not a known name or address ({error}): must be an address of this computer, such as "
+                f"host is '{plain(host, 60)}', which is not a known name or address ({error}): must be an address "
+                "of this computer, such as "
                 "127.0.0.1, or 0.0.0.0 for all its networks"
             ) from None
         family, _, _, _, address = min(found, key=lambda one: one[0] != socket.AF_INET)
@@ -57,8 +59,8 @@ class Listening:
         return f"http://[{name}]:{self.port}" if ":" in name else f"http://{name}:{self.port}"
 
     def answers_to(self, host: str) -> bool:
-        """Whether this value of the header Host may name this server. A page whose name an attacker has pointed to this computer sends its own
-        name. The port may be another one, of a tunnel."""
+        """Whether this value of the header Host may name this server. A page whose name an attacker has pointed to this computer
+        sends its own name. The port may be another one, of a tunnel."""
         match = _HOST.fullmatch(host)
         if match is None:
             return False
@@ -85,7 +87,8 @@ def _bound(family: int, address: tuple[Any, ...], host: str, port: int) -> socke
                     f"port is {candidate}: this user may not listen there ({error.strerror}); choose one from 1024 to 65535"
                 ) from None
             raise ValueError(
-                f"host is '{plain(host, 60)}': this computer cannot listen there ({error.strerror}); must be one of its own addresses, such as "
+                f"host is '{plain(host, 60)}': this computer cannot listen there ({error.strerror}); must be one of "
+                "its own addresses, such as "
                 "127.0.0.1, or 0.0.0.0 for all its networks"
             ) from None
     raise ValueError(f"port is {port}: it and all ports up to {last} are taken")

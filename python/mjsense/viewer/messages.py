@@ -122,7 +122,8 @@ def _is_name(value: Any) -> bool:
 
 
 def _number(value: Any, low: float | None, high: float | None, step: float | None, kind: type) -> Any:
-    """A number between these limits; None: it is none. A browser rounds to decimals, so that a slider's end may be up to one step outside."""
+    """A number between these limits; None: it is none. A browser rounds to decimals, so that a slider's end may be up to one step
+    outside."""
     if type(value) not in (int, float):
         return None
     low, high = (-_MAX_INTEGER if low is None else low), (_MAX_INTEGER if high is None else high)

@@ -52,8 +52,9 @@ def _quiet() -> Iterator[None]:
 def _behind(gate: Gate) -> Iterator[str]:
     """Gives the host of which a server that is made meanwhile is one behind the gate.
 
-    viser has no option for who may connect. It looks ``serve`` of websockets up when it starts, and passes it the host, so ``serve`` is replaced
-    until then. The host does not exist, so that no server listens without the gate, and servers of other programs stay as they are.
+    viser has no option for who may connect. It looks ``serve`` of websockets up when it starts, and passes it the host, so
+    ``serve`` is replaced until then. The host does not exist, so that no server listens without the gate, and servers of other
+    programs stay as they are.
     """
     import websockets.asyncio.server as library
 

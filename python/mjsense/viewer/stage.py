@@ -21,7 +21,8 @@ _MIN_CHANGE = 1e-6  # m, or of a quaternion's components: smaller changes of a p
 
 
 def node(model: Any, kind: str, index: int) -> str:
-    """Name of an element without slashes, which separate levels of the browser's scene tree. Names that are too long get the element's number."""
+    """Name of an element without slashes, which separate levels of the browser's scene tree. Names that are too long get the
+    element's number."""
     name = getattr(model, kind)(index).name
     shown = label(name)
     return f"{kind}_{index}" if not name else name.replace("/", "|") if shown == name else f"{shown} {index}".replace("/", "|")

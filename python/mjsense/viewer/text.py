@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Texts on the page. Instructions, outcomes, names and errors may come from files of others, so all of them pass ``plain`` or ``panel_text``."""
+"""Texts on the page. Instructions, outcomes, names and errors may come from files of others, so all of them pass ``plain`` or
+``panel_text``."""
 
 from __future__ import annotations
 
@@ -28,8 +29,11 @@ def labels(names: Iterable[str]) -> dict[str, str]:
 
 
 def panel_text(title: object, *lines: object) -> str:
-    """HTML of a title and lines in the panel that displays exactly these texts; empty ones are left out. Markdown would interpret HTML, links and
-    images in them."""
+    """HTML of a title and lines in the panel that displays exactly these texts; empty ones are left out. Markdown would interpret
+    HTML, links and images in them."""
     shown = "".join(f"<div>{escaped(line, 2000)}</div>" for line in lines if line)
     head = f"<b>{escaped(title, 2000)}</b>" if title else ""
-    return f"<div style='padding:0 .5em .4em;font-size:.875rem;line-height:1.5;overflow-wrap:anywhere;white-space:pre-wrap'>{head}{shown}</div>"
+    return (
+        "<div style='padding:0 .5em "
+        f".4em;font-size:.875rem;line-height:1.5;overflow-wrap:anywhere;white-space:pre-wrap'>{head}{shown}</div>"
+    )

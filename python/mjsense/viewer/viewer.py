@@ -42,7 +42,8 @@ class Viewer:
             print(f"Port {port} is taken: the viewer uses port {self.port}.", flush=True)
         if not listening.local:
             print(
-                f"The viewer listens at {listening.address}: every person on the network who has the address below, with this computer's name in it, "
+                f"The viewer listens at {listening.address}: every person on the network who has the address below, "
+                "with this computer's name in it, "
                 "can watch and drive, and the connection is not encrypted.",
                 flush=True,
             )
@@ -54,7 +55,8 @@ class Viewer:
         self._start()
 
     def _later(self, handle: Any, action: Callable[[], None]) -> None:
-        """Runs ``action`` in the viewer's thread after the user has changed or clicked a control; of several changes the last counts."""
+        """Runs ``action`` in the viewer's thread after the user has changed or clicked a control; of several changes the last
+        counts."""
 
         async def note(event: Any) -> None:  # runs in the server's thread: messages that come faster do not pile up
             if event.client is not None:  # None: the program has set the value

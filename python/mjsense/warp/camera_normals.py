@@ -26,8 +26,8 @@ class MeshNormals:
 
 @wp.func
 def _triangle_normal(surfaces: Surfaces, meshes: MeshNormals, kind: int, shape: int, o: wp.vec3, d: wp.vec3) -> wp.vec3:
-    """Interpolated between the corners of a mesh's triangle; that of the triangle itself for a height field. The ray begins near the
-    surface, where numbers are small."""
+    """Interpolated between the corners of a mesh's triangle; that of the triangle itself for a height field. The ray begins near
+    the surface, where numbers are small."""
     tree = wp.uint64(0)
     if kind == HFIELD:
         tree = surfaces.height_fields[shape]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Kernels of contact sensors. A thread reads all contacts of one primary in one world, so the number of contacts is not limited."""
+"""Kernels of contact sensors. A thread reads all contacts of one primary in one world, so the number of contacts is not
+limited."""
 
 from __future__ import annotations
 
@@ -89,7 +90,8 @@ def to_axes(contacts: Contacts, c: int, sign: float, v: wp.vec3) -> wp.vec3:
 
 @wp.struct
 class Sum:
-    """The sum of the wrenches of a primary's contacts. Arms and moments are about the first contact, for the precision of float32."""
+    """The sum of the wrenches of a primary's contacts. Arms and moments are about the first contact, for the precision of
+    float32."""
 
     origin: wp.vec3  # m, world
     force: wp.vec3

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""State that a contact sensor keeps from substep to substep: air and contact times, events, the latch over a control step, history."""
+"""State that a contact sensor keeps from substep to substep: air and contact times, events, the latch over a control step,
+history."""
 
 from __future__ import annotations
 

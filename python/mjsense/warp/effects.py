@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The effects of ``mjsense.sensors.effects`` on rows ``[B, size]`` of a device. Arithmetic is float64 in the order of the C++ library, and
-random numbers are the same, so that rows are equal bit for bit where the device's log, sin, cos and exp are those of the host; see
-the page of the backend for the bound elsewhere.
+"""The effects of ``mjsense.sensors.effects`` on rows ``[B, size]`` of a device. Arithmetic is float64 in the order of the C++
+library, and random numbers are the same, so that rows are equal bit for bit where the device's log, sin, cos and exp are those of
+the host; see the page of the backend for the bound elsewhere.
 
 Each effect is an object with ``apply(row)`` and ``reset(mask)``, which only launch kernels.
 """

@@ -68,7 +68,8 @@ def check_overflow(data: mjw.Data, limits: Limits) -> None:
         counts = np.bincount(data.contact.worldid.numpy()[: min(contacts, data.naconmax)], minlength=data.nworld)
         most = f"most of them in world {int(counts.argmax())}" if contacts else "before their exact test"
         _fail(
-            f"there are {max(contacts, found)} contacts or pairs of close geoms in all worlds, {most}, and nconmax is {limits.nconmax} "
+            f"there are {max(contacts, found)} contacts or pairs of close geoms in all worlds, {most}, and nconmax "
+            f"is {limits.nconmax} "
             f"({data.naconmax} in all worlds)",
             f"nconmax={2 * -(-max(contacts, found) // data.nworld)}",
         )

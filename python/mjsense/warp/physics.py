@@ -32,7 +32,8 @@ _FIXED_POSES = ("body_pos", "body_quat", "geom_pos", "geom_quat")
 
 
 def place_fixed_geoms(field: str, model: mjw.Model, data: mjw.Data) -> None:
-    """Computes the poses of geoms that cannot move, if a change of this field changes them; mujoco_warp computes them only once."""
+    """Computes the poses of geoms that cannot move, if a change of this field changes them; mujoco_warp computes them only
+    once."""
     if field not in _FIXED_POSES:
         return
     mjw.kinematics(model, data)

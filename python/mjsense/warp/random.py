@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random numbers that equal those of the C++ library bit for bit (``core/rng.h``): Philox4x32-10, a function of seed, world, stream,
-step and the number of the draw.
+"""Random numbers that equal those of the C++ library bit for bit (``core/rng.h``): Philox4x32-10, a function of seed, world,
+stream, step and the number of the draw.
 
 In C++ draws are made one after the other. Here each draw is addressed by its number, so that threads are independent: uniform
 number ``n`` consists of the 32-bit words ``2 n`` and ``2 n + 1``, and four consecutive words are one block of Philox.

@@ -44,8 +44,8 @@ class Frames:
 
 @wp.func
 def aligned(alignment: int, m: wp.mat33) -> wp.mat33:
-    """The frame's rotation, its heading, or none. The heading is that of the x axis; if that is too short in the xy plane, it follows
-    from the y axis, so that the rays of a body on its back still point down."""
+    """The frame's rotation, its heading, or none. The heading is that of the x axis; if that is too short in the xy plane, it
+    follows from the y axis, so that the rays of a body on its back still point down."""
     if alignment == _BASE:
         return m
     x = float(1.0)

@@ -28,8 +28,8 @@ _WRITTEN = ("qpos", "qvel", "ctrl", "mocap_pos", "mocap_quat")
 
 
 class WarpTaskVectorEnv(TaskVectorEnv):
-    """A :class:`mjsense.tasks.TaskVectorEnv` in worlds on mujoco_warp. Observations, rewards and the ends of episodes are torch tensors on
-    the device; actions may be. Infos are NumPy arrays, except the observations in ``final_obs``.
+    """A :class:`mjsense.tasks.TaskVectorEnv` in worlds on mujoco_warp. Observations, rewards and the ends of episodes are torch
+    tensors on the device; actions may be. Infos are NumPy arrays, except the observations in ``final_obs``.
 
     A world whose episode has ended continues to move until its next episode begins.
     """

@@ -34,8 +34,8 @@ __all__ = [
 class SceneSensors:
     """The sensors by name, and the number of the state that each was computed for.
 
-    The simulation calls :meth:`state_changed` with every change of the state. To the Python objects of the scene's sensors this object is
-    what the C++ simulation is on the CPU: they call :meth:`refresh` before their arrays are read.
+    The simulation calls :meth:`state_changed` with every change of the state. To the Python objects of the scene's sensors this
+    object is what the C++ simulation is on the CPU: they call :meth:`refresh` before their arrays are read.
     """
 
     def __init__(self, sim: Any, worlds: Worlds, stepper: Stepper, graphs: Graphs) -> None:

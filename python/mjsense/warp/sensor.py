@@ -110,7 +110,8 @@ class WarpSensor:
         self.name: str = sensor.name
         self.cfg = sensor.cfg
         self.fields: Mapping[str, wp.array] = {}
-        """Arrays ``[B, ...]`` by name, with the dtypes and shapes of the same sensor on the CPU. The name of a single field is ''."""
+        """Arrays ``[B, ...]`` by name, with the dtypes and shapes of the same sensor on the CPU. The name of a single field is
+        ''."""
 
     def update(self) -> None:
         """Fills the rows of all worlds. It may run several times for the same step of a world; state must not advance then."""

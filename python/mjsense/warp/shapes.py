@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Intersections of rays with MuJoCo's primitive geoms in their own frame, as in ``rays/analytic_shapes.h``.
 
-``hit_...`` return the distance along a unit direction, or ``NO_HIT``: the entry into the solid if it is ahead of the origin, else the
-exit. ``normal_...`` return the outward normal at a point of the surface. Solids are solved from the ray's point nearest to their
-centre, so that the numbers are small where precision matters.
+``hit_...`` return the distance along a unit direction, or ``NO_HIT``: the entry into the solid if it is ahead of the origin, else
+the exit. ``normal_...`` return the outward normal at a point of the surface. Solids are solved from the ray's point nearest to
+their centre, so that the numbers are small where precision matters.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ def hit_plane(size: wp.vec3, o: wp.vec3, d: wp.vec3) -> float:
 
 @wp.func
 def hit_box(size: wp.vec3, o: wp.vec3, d: wp.vec3) -> float:
-    """A ray through an edge hits, so that rounding does not let it pass between two boxes that touch. The distance to a face that is
-    almost parallel to the ray has a large error; within it, the other faces decide."""
+    """A ray through an edge hits, so that rounding does not let it pass between two boxes that touch. The distance to a face that
+    is almost parallel to the ray has a large error; within it, the other faces decide."""
     enter = -NO_HIT
     leave = NO_HIT
     facing_enter = -NO_HIT

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 
 @checked
 class WarpSimulation(KnownAttributes):
-    """B parallel worlds of a scene on mujoco_warp, made by ``mjs.Simulation(scene, num_worlds, backend="warp", device="cuda:0")``.
+    """B parallel worlds of a scene on mujoco_warp, made by
+    ``mjs.Simulation(scene, num_worlds, backend="warp", device="cuda:0")``.
 
     Arrays are on the device: torch tensors if torch is installed, otherwise ``wp.array``. After ``step()``, ``reset()`` and
     ``forward()``, every sensor belongs to the current state.
@@ -101,7 +102,8 @@ class WarpSimulation(KnownAttributes):
     # ---------------------------------------------------------------------------------------------------------- sensors
 
     def add(self, sensor: Any) -> Any:
-        """Adds a sensor written in Python that is not part of the scene, and returns it. Others belong in ``SceneCfg.sensors``."""
+        """Adds a sensor written in Python that is not part of the scene, and returns it. Others belong in
+        ``SceneCfg.sensors``."""
         self._check_open()
         if not isinstance(sensor, Sensor):
             raise NotImplementedError(f"Simulation.add() is for sensors written in Python with backend='warp', not {sensor!r}")
@@ -153,7 +155,8 @@ class WarpSimulation(KnownAttributes):
         0."""
         if dt not in (0.0, self.physics_dt):
             raise ValueError(
-                f"update_sensors(): dt is {dt} s, and the timestep is {self.physics_dt} s; others are not available with backend='warp'"
+                f"update_sensors(): dt is {dt} s, and the timestep is {self.physics_dt} s; others are not available "
+                "with backend='warp'"
             )
         with wp.ScopedDevice(self._device):
             for sensor in (*self._stepper.substepped, *self._sensors.on_host):
@@ -244,7 +247,8 @@ class WarpSimulation(KnownAttributes):
         if len(stale):
             raise RuntimeError(
                 f"step(): the positions or velocities of world {stale[0]} were written without a forward() afterwards, "
-                "and the step began with derived quantities of the old state: call sim.forward(), or write with sim.set_state(...)"
+                "and the step began with derived quantities of the old state: call sim.forward(), or write with "
+                "sim.set_state(...)"
             )
 
     # ------------------------------------------------------------------------------------------------------------ state
@@ -318,8 +322,9 @@ class WarpSimulation(KnownAttributes):
 
     @property
     def time(self) -> Any:
-        """Simulation time of each world, s, float64 ``[B]``; overwritten by the next read. It is 0 after a reset, or the keyframe's
-        time, and ``set_state(time=...)`` changes it. Unless it began elsewhere than at 0, it is an exact multiple of the substep."""
+        """Simulation time of each world, s, float64 ``[B]``; overwritten by the next read. It is 0 after a reset, or the
+        keyframe's time, and ``set_state(time=...)`` changes it. Unless it began elsewhere than at 0, it is an exact multiple of
+        the substep."""
         return arrays.share(self._current_times())
 
     def _current_times(self) -> wp.array:

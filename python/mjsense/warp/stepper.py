@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Steps of all worlds: the physics, worlds that fail, clocks and sensors. Its functions launch kernels only, so that CUDA devices can
-run them as graphs."""
+"""Steps of all worlds: the physics, worlds that fail, clocks and sensors. Its functions launch kernels only, so that CUDA devices
+can run them as graphs."""
 
 from __future__ import annotations
 

@@ -51,7 +51,8 @@ class WorldModels:
         by_world = _fields()
         if field not in by_world:
             raise ValueError(
-                f"{field}: not a field of the model that can differ between worlds with backend='warp'{did_you_mean(field, by_world)} "
+                f"{field}: not a field of the model that can differ between worlds with "
+                f"backend='warp'{did_you_mean(field, by_world)} "
                 f"There are {', '.join(by_world)}"
             )
         return getattr(self._model, field)

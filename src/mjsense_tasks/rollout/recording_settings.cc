@@ -106,7 +106,8 @@ Json checksums_of(const T& object) {
 Json cameras_of(const Rollout& rollout) {
   Json cameras = Json::array();
   for (const RecordedCamera& camera : rollout.cameras()) {
-    Json entry{{"depth", camera.depth},
+    Json entry{{"camera", camera.mjcf_camera},
+               {"depth", camera.depth},
                {"height", camera.height},
                {"name", camera.name},
                {"width", camera.width}};
@@ -161,7 +162,7 @@ std::string recording_settings(const RecordJobCfg& job, Rollout& rollout) {
     sum.add(text.data(), text.size());
     settings["camera_file"] = sum.text();
   }
-  if (cfg.shading == sensors::Shading::kPbr && render::is_environment_file(cfg.environment)) {
+  if (cfg.shading != sensors::Shading::kClassic && render::is_environment_file(cfg.environment)) {
     const std::string bytes = render::read_environment_file(cfg.environment);
     record::Checksum sum;
     sum.add(bytes.data(), bytes.size());

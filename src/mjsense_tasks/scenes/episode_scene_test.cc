@@ -26,10 +26,14 @@ constexpr char kRoom[] = R"(
 <mujoco>
   <asset>
     <texture name="oak" type="2d" builtin="flat" rgb1="1 0 0" width="4" height="4"/>
+    <texture name="oak_normals" type="2d" builtin="flat" rgb1=".5 .5 1" width="4" height="4"/>
+    <texture name="sky" type="2d" builtin="flat" rgb1=".5 .5 1" width="4" height="4"/>
+    <texture name="around" type="cube" builtin="flat" rgb1="1 1 1" width="4" height="4"/>
     <texture name="ash" type="2d" builtin="flat" rgb1="0 1 0" width="4" height="4"/>
     <material name="top" texture="oak" rgba=".8 .6 .4 1"/>
   </asset>
   <worldbody>
+    <light name="around" type="image" texture="around" intensity="300"/>
     <light name="lamp" pos="0 0 3" dir="0 0 -1" diffuse=".5 .5 .5"/>
     <geom type="plane" size="2 2 .1"/>
     <body name="table" pos="1 0 0"><geom name="top" type="box" size=".5 .4 .01" pos="0 0 .5" material="top"/></body>
@@ -349,10 +353,61 @@ TEST(EpisodeScene, VariationIsBoundedAndDependsOnTheEpisodeOnly) {
       EXPECT_FLOAT_EQ(colour[0], colour[2]);  // grey stays grey
       const float* brown = rgba + 4 * (w * m->nmat + material);
       EXPECT_FLOAT_EQ(std::max({brown[0], brown[1], brown[2]}), .8f);
-      textures.insert(texture[mjNTEXROLE * (w * m->nmat + material) + mjTEXROLE_RGB]);
+      const int* roles = texture + mjNTEXROLE * (w * m->nmat + material);
+      textures.insert(roles[mjTEXROLE_RGB]);
+      const bool oak = roles[mjTEXROLE_RGB] == mj_name2id(m, mjOBJ_TEXTURE, "room/oak");
+      EXPECT_EQ(roles[mjTEXROLE_NORMAL],
+                oak ? mj_name2id(m, mjOBJ_TEXTURE, "room/oak_normals") : -1);
     }
   }
   EXPECT_EQ(textures.size(), 2u);
+}
+
+// Classic images have no image lights, so their episodes must not depend on them.
+TEST(EpisodeScene, ImageLightsDrawNumbersOfTheirOwn) {
+  std::vector<float> found;
+  for (const char* pattern : {"room/lamp", "room/.*"}) {
+    Files files;
+    SceneVaryCfg lamp;
+    lamp.what = VaryKind::kLight;
+    lamp.pattern = pattern;
+    lamp.brightness = {.5, 1.5};
+    files.cfg.vary = {lamp, lamp};
+    Played played(files.cfg);
+    played.start(4);
+    const auto* diffuse = static_cast<const float*>(
+        mjb_expanded(played.sim->worlds().batch(), "light_diffuse", nullptr, nullptr));
+    found.push_back(diffuse[3 * mj_name2id(played.sim->model(), mjOBJ_LIGHT, "room/lamp")]);
+    found.push_back(diffuse[3 * mj_name2id(played.sim->model(), mjOBJ_LIGHT, "room/around")]);
+  }
+  EXPECT_EQ(found[0], found[2]);
+  EXPECT_NE(found[1], found[3]);  // it varies
+}
+
+TEST(EpisodeScene, AMoodSetsWhatAMaterialShows) {
+  Files files;
+  SceneVaryCfg glow;
+  glow.what = VaryKind::kMaterial;
+  glow.pattern = "room/top";
+  glow.shows = "room/sky";
+  files.cfg.moods = {{"bright", {}}, {"dark", {glow}}};
+  files.cfg.vary = {};
+  Played played(files.cfg);
+  const mjModel* m = played.sim->model();
+  std::set<std::string> seen;
+  for (std::uint64_t episode = 0; episode < 20; ++episode) {
+    played.start(episode);
+    const auto* roles = static_cast<const int*>(
+        mjb_expanded(played.sim->worlds().batch(), "mat_texid", nullptr, nullptr));
+    const std::string mood = played.scene.mood(3, episode);
+    seen.insert(mood);
+    EXPECT_EQ(roles[mjNTEXROLE * mj_name2id(m, mjOBJ_MATERIAL, "room/top") + mjTEXROLE_EMISSIVE],
+              mood == "dark" ? mj_name2id(m, mjOBJ_TEXTURE, "room/sky") : -1);
+  }
+  EXPECT_EQ(seen.size(), 2u);
+  files.cfg.moods[1].vary[0].what = VaryKind::kGeom;
+  EXPECT_THAT(error_of([&] { validate(files.cfg, ""); }),
+              HasSubstr("shows applies to materials only"));
 }
 
 TEST(EpisodeScene, AnEpisodeHasOneMoodWhoseTintsMultiplyTheOtherColours) {

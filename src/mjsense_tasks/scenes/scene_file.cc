@@ -29,6 +29,8 @@ void check_vary(const std::vector<SceneVaryCfg>& all, const std::string& who) {
                                    what, vary.brightness[0], vary.brightness[1]));
     if (vary.what != VaryKind::kMaterial && !vary.textures.empty())
       throw ValueError(what + ": textures apply to materials only");
+    if (vary.what != VaryKind::kMaterial && !vary.shows.empty())
+      throw ValueError(what + ": shows applies to materials only");
     const bool stands = vary.what == VaryKind::kLight || vary.what == VaryKind::kBody;
     if (!stands && (vary.pos != std::array<double, 3>{} || vary.angle > 0))
       throw ValueError(what + ": pos and angle apply to lights and bodies only");

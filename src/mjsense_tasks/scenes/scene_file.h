@@ -146,6 +146,7 @@ struct SceneVaryCfg {
   std::array<double, 3> pos{};
   double angle = 0;
   std::vector<std::string> textures;
+  std::string shows;
   bool optional = false;
 };
 template <class V>
@@ -170,7 +171,13 @@ void visit_fields(V& v, SceneVaryCfg& c) {
     "light: maximum change of its direction; body: half width of the rotation about the vertical, "
     "degrees.")
       .within(0, 90);
-  v("textures", c.textures, "material: full names of the textures to choose from.");
+  v("textures", c.textures,
+    "material: full names of the textures to choose from. Where there is a texture <name>_normals, "
+    "it is the normal map.");
+  v("shows", c.shows,
+    "material: full name of the texture that it emits in physically based images, such as the view "
+    "from a window.")
+      .or_none();
   v("optional", c.optional,
     "Ignore the entry if nothing matches its pattern, which is an error otherwise. Entries that a "
     "scene inherits are optional.");

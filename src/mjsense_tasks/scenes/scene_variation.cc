@@ -79,7 +79,7 @@ std::vector<SceneVariation::Part> SceneVariation::parts_of(const std::vector<Sce
                                                            const std::string& context) {
   std::vector<Part> parts;
   for (const SceneVaryCfg& one : cfg) {
-    Part part{one, {}, {}};
+    Part part{.cfg = one};
     const mjtObj type = object_type(one.what);
     const std::vector<std::string> names = scene::model_names(model_, type);
     const std::string who = fmt::format("{}, vary {}", context, one.what.text());
@@ -89,8 +89,11 @@ std::vector<SceneVariation::Part> SceneVariation::parts_of(const std::vector<Sce
     }
     if (part.ids.empty() && one.optional) continue;
     if (part.ids.empty()) throw_unknown(who, one.what.text(), one.pattern, names);
-    for (const std::string& texture : one.textures)
+    for (const std::string& texture : one.textures) {
       part.textures.push_back(scene::resolve(model_, mjOBJ_TEXTURE, texture, who));
+      part.normals.push_back(mj_name2id(model_, mjOBJ_TEXTURE, (texture + "_normals").c_str()));
+    }
+    if (!one.shows.empty()) part.shows = scene::resolve(model_, mjOBJ_TEXTURE, one.shows, who);
     const bool colours = changes_colour(one);
     if (colours && one.what == VaryKind::kLight)
       light_diffuse_.expand(batch, "light_diffuse", model_->light_diffuse);
@@ -115,7 +118,8 @@ std::vector<SceneVariation::Part> SceneVariation::parts_of(const std::vector<Sce
       body_pos_.expand(batch, "body_pos", model_->body_pos);
       body_quat_.expand(batch, "body_quat", model_->body_quat);
     }
-    if (!part.textures.empty()) mat_texid_.expand(batch, "mat_texid", model_->mat_texid);
+    if (!part.textures.empty() || part.shows >= 0)
+      mat_texid_.expand(batch, "mat_texid", model_->mat_texid);
     parts.push_back(std::move(part));
   }
   return parts;
@@ -164,9 +168,13 @@ void SceneVariation::move_body(const SceneVaryCfg& cfg, int world, int id, Rng& 
              body_quat_.of(world) + 4 * id);
 }
 
-void SceneVariation::apply(const Part& part, int world, Rng& rng) const {
+void SceneVariation::apply(const Part& part, int world, Rng& episode_rng) const {
   const SceneVaryCfg& c = part.cfg;
   for (int id : part.ids) {
+    // Image lights draw numbers of their own: classic images, which do not have them, stay the same.
+    const bool image_light = c.what == VaryKind::kLight && model_->light_type[id] == mjLIGHT_IMAGE;
+    Rng own = episode_rng;
+    Rng& rng = image_light ? own : episode_rng;
     if (c.what == VaryKind::kBody) {
       move_body(c, world, id, rng);
       continue;
@@ -181,9 +189,12 @@ void SceneVariation::apply(const Part& part, int world, Rng& rng) const {
       }
     }
     if (!part.textures.empty()) {
-      mat_texid_.of(world)[mjNTEXROLE * id + mjTEXROLE_RGB] =
-          part.textures[rng.below(static_cast<std::uint32_t>(part.textures.size()))];
+      const auto drawn = rng.below(static_cast<std::uint32_t>(part.textures.size()));
+      int* roles = mat_texid_.of(world) + mjNTEXROLE * id;
+      roles[mjTEXROLE_RGB] = part.textures[drawn];
+      roles[mjTEXROLE_NORMAL] = part.normals[drawn];
     }
+    if (part.shows >= 0) mat_texid_.of(world)[mjNTEXROLE * id + mjTEXROLE_EMISSIVE] = part.shows;
   }
 }
 

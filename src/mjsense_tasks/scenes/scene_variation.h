@@ -30,7 +30,8 @@ class SceneVariation {
  private:
   struct Part {
     SceneVaryCfg cfg;
-    std::vector<int> ids, textures;
+    std::vector<int> ids, textures, normals;  // normals: of the textures; -1: none
+    int shows = -1;
   };
   struct Mood {
     std::string name;

@@ -7,8 +7,9 @@
     from mjsense.compat.mjlab.sim import MujocoCfg, Simulation, SimulationCfg
     from mjsense.compat.mjlab.terrains import TerrainEntityCfg
 
-Fields, defaults and order of arguments are mjlab's. Configurations can be changed until the scene is created, and are then checked.
-Sensors return torch tensors that share the sensors' memory, or NumPy arrays if torch is not installed. Everything is on the CPU.
+Fields, defaults and order of arguments are mjlab's. Configurations can be changed until the scene is created, and are then
+checked. Sensors return torch tensors that share the sensors' memory, or NumPy arrays if torch is not installed. Everything is on
+the CPU.
 
 Not supported: managers, rewards and other parts of training, actuators that mjlab computes in Python, and sub-terrains not in its
 ``ROUGH_TERRAINS_CFG``. A configuration that names one of these raises an error.

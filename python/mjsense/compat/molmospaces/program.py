@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from mjsense.core.errors import nearest
+from mjsense.compat._opengl import Look
 from mjsense.rendering.renderer import Renderer, camera_of_name
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ _SHADINGS = ("classic", "pbr")
 _own: dict[tuple[type, str], Any] = {}
 """By class and name: the methods of molmo-spaces, for renderers that do not use mjsense."""
 _threads = 0
-_shading, _environment = "classic", "model"
+_look = Look()
 _active = False
 
 
@@ -48,10 +48,8 @@ def use(shading: str = "classic", threads: int = 0, environment: str = "model") 
         ImportError: If molmo-spaces is missing, or of a version that was not tested.
         ValueError: For an unknown `shading`, or a negative number of threads.
     """
-    global _active, _threads, _shading, _environment
-    if shading not in _SHADINGS:
-        near = nearest(shading, list(_SHADINGS), cutoff=0.0)
-        raise ValueError(f"mjsense.compat.molmospaces.use: unknown shading '{shading}'. Nearest: {', '.join(near)}")
+    global _active, _threads, _look
+    look = Look(shading, environment).checked("mjsense.compat.molmospaces.use", _SHADINGS)
     if threads < 0:
         raise ValueError(f"mjsense.compat.molmospaces.use: threads must be at least 0, got {threads}")
     try:
@@ -65,7 +63,7 @@ def use(shading: str = "classic", threads: int = 0, environment: str = "model") 
             f"mjsense.compat.molmospaces.use is tested with molmo-spaces {', '.join(_TESTED)}, and {version} is installed"
         )
     _replace_methods()
-    _active, _threads, _shading, _environment = True, threads, shading, environment
+    _active, _threads, _look = True, threads, look
 
 
 def stop() -> None:
@@ -142,8 +140,7 @@ def __init__(
     self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = True
     self._gl_context = self._mjr_context = None
     self._context_is_cgl = self._depth_rendering = self._segmentation_rendering = self._textures_need_upload = False
-    self._mjsense = Renderer.of_scene(model, self._scene, height, width)
-    self._mjsense.environment, self._mjsense.shading = _environment, _shading
+    self._mjsense = _look.give(Renderer.of_scene(model, self._scene, height, width))
     self._mjsense_views = [View(self._scene, self._mjsense)]
 
 
@@ -292,7 +289,8 @@ def _take(env: Any, camera_name: str, kind: str) -> np.ndarray | None:
 
 
 class Frames:
-    """Images of several cameras of one state, which are drawn together. Each equals the one that molmo-spaces' own calls would give."""
+    """Images of several cameras of one state, which are drawn together. Each equals the one that molmo-spaces' own calls would
+    give."""
 
     def __init__(self, env: Any, wanted: dict[str, list[str]]) -> None:
         self._state = _state_of(env)
@@ -330,8 +328,8 @@ def _views(renderer: Any, count: int) -> list[View]:
     views = renderer._mjsense_views
     while len(views) < count:
         scene = mujoco.MjvScene(renderer.model, renderer.scene.maxgeom)
-        made = Renderer.of_scene(renderer.model, scene, renderer.height, renderer.width)
-        made.environment, made.shading = renderer._mjsense.environment, renderer._mjsense.shading
+        look = Look(renderer._mjsense.shading, renderer._mjsense.environment)
+        made = look.give(Renderer.of_scene(renderer.model, scene, renderer.height, renderer.width))
         views.append(View(scene, made))
     for view in views[1:]:
         view.scene.flags[:] = renderer.scene.flags

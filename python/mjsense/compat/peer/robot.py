@@ -251,7 +251,8 @@ class PeerRobot:
     def fk(
         self, move_group_qpos: dict[str, np.ndarray], base_pose: np.ndarray, rel_to_base: bool = False
     ) -> dict[str, np.ndarray]:
-        """4x4 of every group's tool frame with its joints there: in the base frame, or in the world with the base at base_pose."""
+        """4x4 of every group's tool frame with its joints there: in the base frame, or in the world with the base at
+        base_pose."""
         poses = {
             name: matrix_of_pose(pose) for name, pose in self._task.fk({k: list(v) for k, v in move_group_qpos.items()}).items()
         }

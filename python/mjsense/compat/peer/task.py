@@ -20,8 +20,8 @@ from mjsense.compat.peer.robot import RobotWorlds
 class PeerTask:
     """The task. Where MolmoSpaces has one world, the value is that of the world whose sensor is being computed.
 
-    All other attributes are those of the user-defined :class:`mjsense.Task`, if the task is one. Such a task is evaluated after the
-    sensors, so ``get_info()`` and ``judge_success()`` then refer to the previous observation.
+    All other attributes are those of the user-defined :class:`mjsense.Task`, if the task is one. Such a task is evaluated after
+    the sensors, so ``get_info()`` and ``judge_success()`` then refer to the previous observation.
     """
 
     def __init__(self, env: RobotWorlds, view: _core.TaskView) -> None:

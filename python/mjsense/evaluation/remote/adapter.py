@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a policy in another process names, sizes and scales observations and actions: which stream becomes which key of its messages."""
+"""How a policy in another process names, sizes and scales observations and actions: which stream becomes which key of its
+messages."""
 
 from __future__ import annotations
 
@@ -102,13 +103,15 @@ class Adapter:
             for stream in one.streams:
                 if stream not in specs:
                     raise ValueError(
-                        f"adapter '{self.name}': there is no stream '{stream}' for '{key}'{did_you_mean(stream, specs, 'there are')}"
+                        f"adapter '{self.name}': there is no stream '{stream}' for "
+                        f"'{key}'{did_you_mean(stream, specs, 'there are')}"
                     )
             plain = len(one.streams) == 1 and one.numbers == Numbers()
             rows = [stream for stream in one.streams if len(specs[stream].shape) > 1]
             if rows and not plain:
                 raise ValueError(
-                    f"adapter '{self.name}': '{key}' contains '{rows[0]}' of shape {specs[rows[0]].shape}, whose numbers can neither be "
+                    f"adapter '{self.name}': '{key}' contains '{rows[0]}' of shape {specs[rows[0]].shape}, whose "
+                    "numbers can neither be "
                     "chosen, converted nor concatenated"
                 )
             if (one.size is not None or one.layout != "hwc") and not (plain and is_image_spec(specs[one.streams[0]])):
@@ -124,7 +127,8 @@ class Adapter:
                 specs.get(f"actions/joint_pos/{group}"), low[groups[group]], high[groups[group]]
             ):
                 raise ValueError(
-                    f"adapter '{self.name}': the commands of the move group '{group}' are joint targets, and its controller takes other "
+                    f"adapter '{self.name}': the commands of the move group '{group}' are joint targets, and its "
+                    "controller takes other "
                     "commands (arm_controller)"
                 )
             width, columns, to = groups[group].stop - groups[group].start, one.numbers.columns, one.numbers.target
@@ -214,8 +218,8 @@ def _chunk(value: Any, key: str) -> np.ndarray:
 
 
 def resized(image: np.ndarray, width: int, height: int) -> np.ndarray:
-    """An image ``[h, w, c]`` of this size: scaled with its aspect ratio, and centred between black bars, as ``resize_with_pad`` of
-    openpi does."""
+    """An image ``[h, w, c]`` of this size: scaled with its aspect ratio, and centred between black bars, as ``resize_with_pad``
+    of openpi does."""
     if image.shape[:2] == (height, width):
         return image
     pillow = optional("PIL.Image", "evaluate", "an adapter that resizes images")

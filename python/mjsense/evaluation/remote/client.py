@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Connections to a policy server: one for each world and episode, because servers keep the state of an episode for each connection."""
+"""Connections to a policy server: one for each world and episode, because servers keep the state of an episode for each
+connection."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
 import logging
+import ssl
 import sys
 import threading
 import weakref
@@ -15,6 +17,7 @@ from urllib.parse import urlsplit
 
 from mjsense.core.optional import optional
 from mjsense.core.representations import plain
+from mjsense.evaluation.remote.access import client_context, headers_of
 from mjsense.evaluation.remote.adapter import MJSENSE
 from mjsense.evaluation.remote.messages import MAX_BYTES, unpack
 
@@ -32,9 +35,12 @@ class Connections:
         url: ``ws://HOST:PORT`` or ``wss://HOST:PORT``.
         timeout: Time in which the server must accept a connection, and answer a message. [s]
         patience: Time for which a server that cannot be reached is tried again. [s]
+        key: The server's key; empty: none.
+        certificate: File with the certificate to trust; empty: those that the system trusts.
     """
 
-    def __init__(self, url: str, *, timeout: float, patience: float) -> None:
+    def __init__(self, url: str, *, timeout: float, patience: float, key: str = "", certificate: str = "") -> None:
+        self._headers, self._encryption = headers_of(key), client_context(url, certificate)
         self.url, self._timeout, self._patience = checked_url(url), timeout, patience
         self._library: Any = optional("websockets.asyncio.client", "evaluate", "a remote policy")
         self._errors: Any = optional("websockets.exceptions", "evaluate", "a remote policy")
@@ -50,7 +56,8 @@ class Connections:
         """Closes all connections."""
 
     def server(self) -> dict[str, Any]:
-        """What ``mjsense serve`` says about its policy in its first message; empty: it is another server. The connection is closed again."""
+        """What ``mjsense serve`` says about its policy in its first message; empty: it is another server. The connection is
+        closed again."""
         return self._run(self._greeting())
 
     def begin(self, worlds: Iterable[int]) -> None:
@@ -125,6 +132,8 @@ class Connections:
             ping_interval=None,  # openpi's servers do not answer pings while they compute
             close_timeout=2,
             logger=_SILENT,
+            additional_headers=self._headers,
+            ssl=self._encryption,
         )
         try:
             metadata = self._read(await link.recv())
@@ -144,11 +153,20 @@ class Connections:
             try:
                 return await self._within(attempt(), "accepted a connection")
             except self._errors.InvalidStatus as error:
+                if error.response.status_code == 401:
+                    raise ConnectionError(
+                        f"{self.url} needs {'another' if self._headers else 'a'} key: the option key_file"
+                    ) from None
                 if error.response.status_code < 500:
                     raise ConnectionError(
                         f"{self.url} refuses websockets with the HTTP status {error.response.status_code}"
                     ) from None
                 last = error
+            except ssl.SSLCertVerificationError as error:
+                raise ConnectionError(
+                    f"{self.url}: its certificate is not trusted: {error.verify_message}; the option certificate names the "
+                    "file of one that is"
+                ) from None
             except (TimeoutError, ValueError, RuntimeError):
                 raise
             except (OSError, EOFError, self._errors.WebSocketException) as error:
@@ -157,7 +175,8 @@ class Connections:
                 print(f"Waiting for the policy server at {self.url}: {plain(last) or type(last).__name__}", file=sys.stderr)
             if self._loop.time() + delay > end:
                 raise ConnectionError(
-                    f"no policy server answers at {self.url}, which was tried for {self._patience:g} s: {plain(last) or type(last).__name__}"
+                    f"no policy server answers at {self.url}, which was tried for {self._patience:g} s: "
+                    f"{plain(last) or type(last).__name__}"
                 )
             await asyncio.sleep(delay)
             delay = min(2 * delay, _MAX_DELAY)

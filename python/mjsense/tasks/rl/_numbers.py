@@ -56,7 +56,8 @@ class Numbers:
         return gymnasium.spaces.Box(-np.inf, np.inf, (self.size,), np.float32)
 
     def of(self, observation: dict[str, Any], worlds: int) -> Any:
-        """A new array with the rows of all worlds, ``[worlds, n]``; a tensor on the same device if the observations are tensors."""
+        """A new array with the rows of all worlds, ``[worlds, n]``; a tensor on the same device if the observations are
+        tensors."""
         first: Any = stream_of(observation, self._paths[self.names[0]]) if self.names else None
         if hasattr(first, "detach"):
             rows = first.new_empty((worlds, self.size), dtype=first.float().dtype)

@@ -28,8 +28,8 @@ class RslRlVecEnv(VecEnv):
             rows of a TensorDict. By default one group ``policy`` with all streams.
         action_mean, action_scale: A command is ``action_mean + action_scale * action``; numbers or ``[n]``. By default the centre
             and half the width of the actuators' ranges. Commands are clipped to these ranges.
-        device: Device of the trainer. Worlds of ``make_vec(..., backend="warp")`` on the same device exchange tensors with it without
-            a copy to the host.
+        device: Device of the trainer. Worlds of ``make_vec(..., backend="warp")`` on the same device exchange tensors with it
+            without a copy to the host.
     """
 
     def __init__(

@@ -23,9 +23,10 @@ from mjsense.tasks.rl._numbers import Actions, Numbers, checked_env, is_depth, s
 class SB3VecEnv(VecEnv):
     """A :class:`mjsense.tasks.TaskVectorEnv` for the algorithms of Stable-Baselines3.
 
-    Observations are one row of float32 ``[n]`` (``MlpPolicy``), or with images a dict of ``"state"``, unless there are only images, and the
-    images (``MultiInputPolicy``): uint8 ``[H, W, 3]``, and depth in metres, float32 ``[1, H, W]``, which Stable-Baselines3 treats as an image
-    with ``policy_kwargs={"normalize_images": False}`` and flattens otherwise. Actions are in [-1, 1].
+    Observations are one row of float32 ``[n]`` (``MlpPolicy``), or with images a dict of ``"state"``, unless there are only
+    images, and the images (``MultiInputPolicy``): uint8 ``[H, W, 3]``, and depth in metres, float32 ``[1, H, W]``, which
+    Stable-Baselines3 treats as an image with ``policy_kwargs={"normalize_images": False}`` and flattens otherwise. Actions are in
+    [-1, 1].
 
     Args:
         env: Result of ``make_vec(..., autoreset_mode="same_step")``.

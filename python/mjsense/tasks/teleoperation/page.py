@@ -118,8 +118,8 @@ class DrivePage(Viewer):
             self._place_handle()
 
     def begin_episode(self, base: Pose, target: Pose, instruction: str) -> None:
-        """Shows the world of a new episode and what is to be done, with the target at the tool. It waits until the user moves the target or ends
-        the pause."""
+        """Shows the world of a new episode and what is to be done, with the target at the tool. It waits until the user moves the
+        target or ends the pause."""
         self._paused.value = True
         self.base, self.target, self.finished = base, target, False
         self._closed_box.value = False

@@ -33,5 +33,6 @@ class Pose:
         return Pose(base.position + rotation_of(base.quaternion) @ self.position, product(base.quaternion, self.quaternion))
 
     def moved(self, translation: np.ndarray, rotation: np.ndarray) -> Pose:
-        """Displaced by a translation (m) and a rotation vector (rad) in the axes of its frame; the rotation is about its own origin."""
+        """Displaced by a translation (m) and a rotation vector (rad) in the axes of its frame; the rotation is about its own
+        origin."""
         return Pose(self.position + translation, product(rotation_by(rotation), self.quaternion))

@@ -24,7 +24,8 @@ _POLL = 0.005  # s between two looks for events while the worlds wait
 
 
 class Teleoperation(Policy):
-    """Drives one arm and its gripper as a person wants, in real time. The arm has the controller ``ee_pose``; other move groups hold.
+    """Drives one arm and its gripper as a person wants, in real time. The arm has the controller ``ee_pose``; other move groups
+    hold.
 
     An episode ends when the task ends it, or when the person does.
     """
@@ -168,7 +169,10 @@ def play(
     shading: Literal["classic", "pbr", "path"] = "classic",
     samples_per_pixel: int = 64,
     exposure: float = 8.0,
-    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "neutral",
+    exposure_mode: Literal["fixed", "auto"] = "fixed",
+    exposure_time_constant: float = 0.5,
+    imager: Literal["none", "d435", "zed_mini"] = "none",
+    tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "filmic",
     white_balance: float = 6504.0,
     environment: str = "model",
     environment_intensity: float = 1.0,
@@ -181,8 +185,8 @@ def play(
     open_browser: bool = True,
     **options: Any,
 ) -> RecordSummary:
-    """Records demonstrations by a person who drives the robot in the browser, as any policy's episodes. The page shows the scene, the
-    images of the cameras and a handle at the tool, which is dragged or moved by keys. An episode ends when the task succeeds.
+    """Records demonstrations by a person who drives the robot in the browser, as any policy's episodes. The page shows the scene,
+    the images of the cameras and a handle at the tool, which is dragged or moved by keys. An episode ends when the task succeeds.
 
     Args:
         task, robot, scene: As in :func:`record`.
@@ -223,20 +227,23 @@ def play(
         samples_per_pixel: Paths per pixel with shading path; four times as many halve the noise. ``samples`` and
             ``shadow_samples`` are for the other kinds of shading.
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness.
+        exposure_mode: auto: a meter chooses the exposure of each world, instead of ``exposure``.
+        exposure_time_constant: Time in which the automatic exposure covers 63 % of a change; 0: it follows at once. [s]
+        imager: Photon and read noise, vignetting and quantisation of the colour sensor of a real camera.
         tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
             clips; agx: bright colours become white.
         white_balance: Colour temperature of the light that appears white. [K]
         environment: Light from the surroundings. model: the model's image light, else studio; auto: its image light,
-            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr
-            file, which is also the background.
+            else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or the path of an .hdr or
+            .exr file, which is also the background.
         environment_intensity: Factor of the light from the surroundings.
         environment_rotation: Rotation of the surroundings about the world's z axis; a skybox in the background does not
             rotate. [degrees]
         ambient_occlusion: Darken the light from the surroundings where other geoms are near.
         Others:
         seed: Random seed of the starts.
-        host: Address that the page's server is bound to; the default is reachable from this computer only. The page opens with the printed
-            address, which contains a token.
+        host: Address that the page's server is bound to; the default is reachable from this computer only. The page opens with
+            the printed address, which contains a token.
         port: Port of the server; if it is taken, the next free one; 0: any free one.
         open_browser: Open the page in the default browser.
         options: Further options of :func:`record`, such as ``append=True``.

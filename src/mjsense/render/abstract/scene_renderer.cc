@@ -21,7 +21,8 @@ namespace mjsense::render {
 namespace {
 
 constexpr float kUnbounded = 1e30f;
-constexpr int kSpot = 0, kDirectional = 1, kPoint = 2;  // mjtLightType, the same in all versions
+constexpr int kSpot = 0, kDirectional = 1, kPoint = 2,
+              kImage = 3;  // mjtLightType, the same in all versions
 
 bool finite(std::span<const float> values) {
   return std::ranges::all_of(values, [](float x) { return std::isfinite(x); });
@@ -119,7 +120,8 @@ void SceneRenderer::render(const SceneMemory& scene, int width, int height,
                     .sized_soft_textures = settings_.sized_soft_textures,
                     .physical = images.rgb && physical_.on ? &physical_ : nullptr,
                     .intensities = intensities_,
-                    .ranges = ranges_};
+                    .ranges = ranges_,
+                    .environment_tint = environment_tint_};
     const View& built = builder_->build(view, position_, rotation_, grid_);
     if (built.physical.all_geoms) {
       trace_paths(built, images.rgb);
@@ -525,9 +527,15 @@ void SceneRenderer::read_lights(const SceneMemory& scene) {
   lights_.clear();
   intensities_.clear();
   ranges_.clear();
+  environment_tint_ = {1, 1, 1};
+  bool image_light = false;
   for (int i = 0; i < std::min(scene.num_lights, kClassicLights); ++i) {
     AbstractLight light;
     light_reader_.read(scene.lights + i * scene.light_stride, light);
+    if (light.type == kImage && !image_light) {
+      image_light = true;
+      environment_tint_ = environment_factors(light.diffuse, light.intensity);
+    }
     bool directional = light.type < 0 ? light.directional != 0 : light.type == kDirectional;
     const bool drawn_point = scene.point_lights && light.type == kPoint;
     if (!directional && light.type > kSpot && !drawn_point) {

@@ -111,6 +111,7 @@ class SceneRenderer {
   std::vector<std::pair<int, int>> segments_;  // object id and type by segmentation id
   std::vector<ViewLight> lights_;
   std::vector<float> intensities_, ranges_;  // by light
+  Rgb64 environment_tint_;
   double position_[3], rotation_[9];
   PixelGrid grid_;
   float near_ = 0, far_ = 0;

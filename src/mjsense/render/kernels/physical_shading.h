@@ -183,8 +183,7 @@ inline void add_ambient(const View& view, const Surfaces& s, const Reflectances&
   const Float visible = load(open + k);
   // Filament 5.6.2 (Lagarde): surfaces mirror what is above their horizon.
   const Float seen = load(r.cosine + k) + visible;
-  const Float gloss = min(max(fma(seen, seen, visible - splat(1.0f)), splat(0.0f)), splat(1.0f)) *
-                      splat(v.radiance_scale);
+  const Float gloss = min(max(fma(seen, seen, visible - splat(1.0f)), splat(0.0f)), splat(1.0f));
   const Float terms[9] = {n.x,       n.y,       n.z,       n.x * n.x, n.y * n.y,
                           n.z * n.z, n.x * n.y, n.x * n.z, n.y * n.z};
   const Float radiance[3] = {ahead.r, ahead.g, ahead.b};
@@ -194,7 +193,8 @@ inline void add_ambient(const View& view, const Surfaces& s, const Reflectances&
       irradiance = fma(terms[i], splat(v.irradiance[i + 1][c]), irradiance);
     const Float matte = load(r.matte[c] + k);
     const Float around = max(irradiance, splat(0.0f)) * with_bounces(visible, matte);
-    const Float add = fma(matte, around, load(r.albedo[c] + k) * gloss * radiance[c]);
+    const Float shine = load(r.albedo[c] + k) * (gloss * splat(v.radiance_scale[c]));
+    const Float add = fma(matte, around, shine * radiance[c]);
     store(sum.rgb[c] + k, load(sum.rgb[c] + k) + add);
   }
 }

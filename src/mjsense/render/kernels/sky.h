@@ -18,9 +18,9 @@ inline void find_sky_radiance(const View& view, Vec3f d, Float* parts) {
   for (int c = 0; c < 3; ++c) parts[c] = srgb_to_linear(parts[c]) * splat(p.unit);
   if (!p.shows_environment) return;
   const Radiance seen = environment_radiance(*p.radiance, from_geom(p.r_ec, d), splat(0.0f));
-  parts[0] = seen.r * splat(p.radiance_scale);
-  parts[1] = seen.g * splat(p.radiance_scale);
-  parts[2] = seen.b * splat(p.radiance_scale);
+  parts[0] = seen.r * splat(p.radiance_scale[0]);
+  parts[1] = seen.g * splat(p.radiance_scale[1]);
+  parts[2] = seen.b * splat(p.radiance_scale[2]);
 }
 
 inline void shade_background(const View& view, const Pixels& pixels, std::uint32_t lanes,

@@ -161,7 +161,7 @@ inline void shade_pixels(const View& view, const FixedTile* fixed, const Reflect
                       tile.hits[q], colors);
   if (radiance)
     for (int c = 0; c < 3; ++c) copy_lanes(colors.rgb[c], radiance->rgb[c]);
-  if (view.physical.on) map_tones(view, colors);
+  if (view.physical.on) map_tones(view.physical, colors);
 }
 
 // Replaces the colours of the pixels by the means of their samples. A pixel all of whose samples see

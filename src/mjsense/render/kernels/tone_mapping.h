@@ -49,8 +49,7 @@ inline Vec3f shown(const float* curve, Vec3f c) {
 }
 
 // Replaces linear radiance by colours in [0, 1].
-inline void map_tones(const View& view, Colors& colors) {
-  const PhysicalView& p = view.physical;
+inline void map_tones(const PhysicalView& p, Colors& colors) {
   for (int k = 0; k < kLanes; k += kWidth) {
     Vec3f c{load(colors.rgb[0] + k), load(colors.rgb[1] + k), load(colors.rgb[2] + k)};
     c = {c.x * splat(p.white[0]), c.y * splat(p.white[1]), c.z * splat(p.white[2])};

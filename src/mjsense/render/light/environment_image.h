@@ -32,7 +32,9 @@ struct EnvironmentImage {
 EnvironmentImage skybox_image(const mjModel* model, int texture);
 
 // Whether `name` is the path of a file; names of surroundings have no suffix.
-inline bool is_environment_file(std::string_view name) { return name.ends_with(".hdr"); }
+inline bool is_environment_file(std::string_view name) {
+  return name.ends_with(".hdr") || name.ends_with(".exr");
+}
 
 // The bytes of a file. Throws ValueError that names it.
 std::string read_environment_file(const std::string& path);
@@ -40,6 +42,14 @@ std::string read_environment_file(const std::string& path);
 // A Radiance picture: 32-bit RGBE, equirectangular, of at most 8192 x 4096 pixels. Throws ValueError
 // that names the file.
 EnvironmentImage parse_radiance(const std::string& path, std::string_view bytes);
+
+// A function that converts an OpenEXR picture to a Radiance picture; the Python package sets one. Throws
+// ValueError that names the file.
+using ExrReader = std::string (*)(const std::string& path, const std::string& bytes);
+void set_exr_reader(ExrReader reader);
+
+// Either of them, by the suffix of the path.
+EnvironmentImage parse_environment(const std::string& path, const std::string& bytes);
 
 inline EnvironmentImage read_radiance_file(const std::string& path) {
   return parse_radiance(path, read_environment_file(path));

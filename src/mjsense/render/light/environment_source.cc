@@ -192,18 +192,6 @@ int skybox_of(const mjModel* m) {
   return -1;
 }
 
-// Null arrays: the model is of a version of MuJoCo without image lights.
-int image_light_of(const mjModel* m) {
-  if (!m->light_type || !m->light_texid || !m->light_active) return -1;
-  for (int i = 0; i < m->nlight; ++i) {
-    const int id = m->light_texid[i];
-    if (m->light_type[i] == mjLIGHT_IMAGE && m->light_active[i] && id >= 0 && id < m->ntex &&
-        m->tex_type[id] != mjTEXTURE_2D && is_color(m, id))
-      return id;
-  }
-  return -1;
-}
-
 // By the content of a texture or a file.
 ContentCache<Environment>& prepared_sources() {
   static ContentCache<Environment> all;
@@ -222,12 +210,24 @@ std::shared_ptr<const Environment> of_texture(const mjModel* m, int id) {
 [[noreturn]] void throw_no_environment(const std::string& name) {
   if (name.find('.') == std::string::npos && name.find('/') == std::string::npos)
     throw_unknown("environment", "surroundings", name,
-                  {{std::string("model"), "auto", "skybox", "studio", "FILE.hdr"}});
+                  {{std::string("model"), "auto", "skybox", "studio", "FILE.hdr", "FILE.exr"}});
   throw ValueError(
-      fmt::format("environment '{:.300}': only Radiance pictures (.hdr) are read", name));
+      fmt::format("environment '{:.300}': only pictures of type .hdr and .exr are read", name));
 }
 
 }  // namespace
+
+// Null arrays: the model is of a version of MuJoCo without image lights.
+int image_light_of(const mjModel* m) {
+  if (!m->light_type || !m->light_texid || !m->light_active) return -1;
+  for (int i = 0; i < m->nlight; ++i) {
+    const int id = m->light_texid[i];
+    if (m->light_type[i] == mjLIGHT_IMAGE && m->light_active[i] && id >= 0 && id < m->ntex &&
+        m->tex_type[id] != mjTEXTURE_2D && is_color(m, id))
+      return i;
+  }
+  return -1;
+}
 
 std::shared_ptr<const Environment> prepared(EnvironmentImage image) {
   normalize(image);
@@ -241,12 +241,12 @@ std::shared_ptr<const Environment> environment(const mjModel* model, const std::
   if (is_environment_file(name)) {
     const std::string bytes = read_environment_file(name);
     return prepared_sources().get(ContentKey().add(std::span<const char>(bytes)),
-                                  [&] { return prepared(parse_radiance(name, bytes)); });
+                                  [&] { return prepared(parse_environment(name, bytes)); });
   }
   if (name == "studio") return studio();
   if (name != "auto" && name != "model" && name != "skybox") throw_no_environment(name);
   if (const int light = name == "skybox" ? -1 : image_light_of(model); light >= 0)
-    return of_texture(model, light);
+    return of_texture(model, model->light_texid[light]);
   if (name == "model") return studio();
   if (const int sky = skybox_of(model); sky >= 0) return of_texture(model, sky);
   if (name == "auto") return studio();

@@ -18,6 +18,9 @@ namespace mjsense::render {
 // Equal surroundings are prepared once for the process. Throws ValueError or KeyError.
 std::shared_ptr<const Environment> environment(const mjModel* model, const std::string& name);
 
+// The model's first active image light with a cube texture; -1: none.
+int image_light_of(const mjModel* model);
+
 // Prepares an image, scaled so that the mean luminance of all directions is 1. The work is divided
 // among all CPUs; the result does not depend on their number.
 std::shared_ptr<const Environment> prepared(EnvironmentImage image);

@@ -210,7 +210,7 @@ TEST(Environment, DamagedFilesAreOneClearError) {
   EXPECT_EQ(error_of_file(start + "-Y 1 +X 2\n\xff\xff\xff\xff\xff\xff\xff\xff"),
             e + "radiance 1.69477e+38 in column 0, row 0; the maximum is 1e+09");
   EXPECT_EQ(error_of([] { return environment(nullptr, "sky.jpg"); }),
-            "environment 'sky.jpg': only Radiance pictures (.hdr) are read");
+            "environment 'sky.jpg': only pictures of type .hdr and .exr are read");
   EXPECT_EQ(error_of<KeyError>([] { return environment(nullptr, "stdio"); }),
             "environment: no surroundings named 'stdio'; did you mean 'studio'?");
   EXPECT_EQ(error_of([] { return environment(nullptr, "none.hdr"); }),

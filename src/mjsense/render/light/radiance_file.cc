@@ -17,6 +17,8 @@
 namespace mjsense::render {
 namespace {
 
+ExrReader exr_reader = nullptr;
+
 constexpr int kMaxHeight = 4096;
 constexpr float kMaxRadiance = 1e9f;
 constexpr std::size_t kMaxBytes = std::size_t{512} << 20;
@@ -80,6 +82,16 @@ void read_channels(Reader& in, int width, std::vector<std::uint8_t>& out) {
 }
 
 }  // namespace
+
+void set_exr_reader(ExrReader reader) { exr_reader = reader; }
+
+EnvironmentImage parse_environment(const std::string& path, const std::string& bytes) {
+  if (!path.ends_with(".exr")) return parse_radiance(path, bytes);
+  if (!exr_reader)
+    throw ValueError(fmt::format(
+        "environment '{}': only the Python package reads .exr files; convert it to .hdr", path));
+  return parse_radiance(path, exr_reader(path, bytes));
+}
 
 std::string read_environment_file(const std::string& path) {
   struct stat state;

@@ -104,7 +104,8 @@ bool PathLights::is_ball(const ViewLight& light, double distance) const {
 }
 
 double PathLights::environment_estimate() const {
-  return pi * environment_->mean() * view_->physical.radiance_scale;
+  const float* scale = view_->physical.radiance_scale;
+  return pi * environment_->mean() * luminance({scale[0], scale[1], scale[2]});
 }
 
 // Luminance of the light on a surface that faces it. Lights of the model, then emissive geoms.
@@ -237,7 +238,7 @@ bool PathLights::sample(const Vec3& p, double total, PathRandom& random, LightSa
   out.blocked = true;
   out.density = environment_->density(d);
   out.radiance = environment_->radiance(d);
-  for (double& c : out.radiance) c *= view_->physical.radiance_scale;
+  for (int c = 0; c < 3; ++c) out.radiance[c] *= view_->physical.radiance_scale[c];
   return out.density > 0;
 }
 
@@ -247,7 +248,7 @@ Rgb64 PathLights::surroundings(const Vec3& direction, double density, double tot
   const Vec3 d = to_environment(direction);
   Rgb64 out = environment_->radiance(d);
   const double drawn = density == 0 ? 0 : environment_->density(d) * estimate / total;
-  for (double& c : out) c *= view_->physical.radiance_scale * share(density, drawn);
+  for (int c = 0; c < 3; ++c) out[c] *= view_->physical.radiance_scale[c] * share(density, drawn);
   return out;
 }
 

@@ -37,7 +37,7 @@ struct PathPixel {
 // Replaces the radiance of pixels that hit nothing by the background's; adds haze and fog.
 void add_background(const View& view, std::span<PathPixel> pixels);
 
-// From linear radiance to the colours of a display, 0..1.
-void map_to_display(const View& view, std::span<PathPixel> pixels);
+// From linear radiance [pixels, 3] to the colours of a display, 0..1, in place.
+void map_to_display(const PhysicalView& view, std::span<float> rgb);
 
 }  // namespace mjsense::render

@@ -48,7 +48,7 @@ Traced trace(TestRenderer& s, int samples, std::array<double, 3> at, int size, d
   PathTracer tracer(
       samples, std::make_shared<const EnvironmentSampler>(s.options.physical.environment->light));
   tracer.build(view);
-  Traced out{size, std::vector<float>(3 * size * size), view.physical.radiance_scale};
+  Traced out{size, std::vector<float>(3 * size * size), view.physical.radiance_scale[0]};
   ImageTargets targets;
   targets.hdr = out.radiance.data();
   tracer.render(0, (size + kTileSize - 1) / kTileSize, targets);

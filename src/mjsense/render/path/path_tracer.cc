@@ -25,7 +25,7 @@ void PathTracer::render(int first, int last, const ImageTargets& targets) const 
   const int width = view.grid.width, height = view.grid.height;
   PathWave wave(scene_, lights_);
   std::vector<double> sum;
-  std::vector<PathPixel> pixels;
+  std::vector<float> colors;
   for (int y0 = first * kTileSize; y0 < std::min(last * kTileSize, height); y0 += kTileSize) {
     const int y1 = std::min(y0 + kTileSize, height);
     for (int x0 = 0; x0 < width; x0 += kTileSize) {
@@ -33,20 +33,19 @@ void PathTracer::render(int first, int last, const ImageTargets& targets) const 
       sum.assign(3 * static_cast<std::size_t>((x1 - x0) * (y1 - y0)), 0);
       for (int s = 0; s < samples_; s += kTogether)
         wave.add_samples(x0, x1, y0, y1, s, std::min(s + kTogether, samples_), sum);
-      pixels.resize(sum.size() / 3);
+      colors.resize(sum.size());
       for (std::size_t i = 0; i < sum.size(); ++i)
-        pixels[i / 3].rgb[i % 3] = static_cast<float>(sum[i] / samples_);
+        colors[i] = static_cast<float>(sum[i] / samples_);
       const auto write = [&](auto* image, auto value) {
-        const PathPixel* from = pixels.data();
+        const float* from = colors.data();
         for (int y = y0; y < y1; ++y)
-          for (int x = x0; x < x1; ++x, ++from)
-            for (int c = 0; c < 3; ++c)
-              image[3 * (static_cast<std::size_t>(y) * width + x) + c] = value(from->rgb[c]);
+          for (int i = 3 * x0; i < 3 * x1; ++i)
+            image[3 * static_cast<std::size_t>(y) * width + i] = value(*from++);
       };
       if (targets.hdr)
         write(targets.hdr, [&](float x) { return x * view.physical.white_radiance; });
       if (!targets.rgb) continue;
-      map_to_display(view, pixels);
+      map_to_display(view.physical, colors);
       write(targets.rgb, [](float x) {
         return static_cast<std::uint8_t>(std::lround(255 * std::clamp(x, 0.0f, 1.0f)));
       });

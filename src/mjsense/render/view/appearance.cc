@@ -5,6 +5,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "mjsense/render/light/environment_source.h"
+#include "mjsense/render/view/physical_light.h"
+
 namespace mjsense::render {
 namespace {
 
@@ -67,6 +70,9 @@ void Appearance::copy(const mjModel* m) {
 // take a slot but have no effect.
 void Appearance::copy_lights(const mjModel* m) {
   num_lights_ = 0;
+  environment_tint_ = {1, 1, 1};
+  if (const int i = image_light_of(m); i >= 0)
+    environment_tint_ = environment_factors(m->light_diffuse + 3 * i, m->light_intensity[i]);
   int places = 0;
   const auto add = [&](int id, const float* ambient, const float* diffuse,
                        const float* specular) -> ViewLight& {

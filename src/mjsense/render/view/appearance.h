@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "mjsense/rays/flex_surface.h"
+#include "mjsense/render/light/material.h"
 #include "mjsense/render/view/texture_maps.h"
 #include "mjsense/render/view/view_light.h"
 
@@ -50,6 +51,8 @@ class Appearance {
   // For physically based shading: candela, or lux for directional lights, 0: not set; m.
   std::span<const float> light_intensities() const { return light_intensities_; }
   std::span<const float> light_ranges() const { return light_ranges_; }
+  // Of the image light, environment_factors().
+  const Rgb64& environment_tint() const { return environment_tint_; }
 
  private:
   void copy_lights(const mjModel* model);
@@ -62,6 +65,7 @@ class Appearance {
   std::vector<ViewLight> lights_;
   std::vector<int> light_ids_;
   std::vector<float> light_radii_, light_intensities_, light_ranges_;
+  Rgb64 environment_tint_;
   std::size_t num_lights_ = 0;
 };
 

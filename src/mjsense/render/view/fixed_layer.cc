@@ -48,6 +48,7 @@ bool FixedLayer::settles(const View& view) {
   if (same(view)) return !std::exchange(made_, true);
   made_ = false;
   grid_ = view.grid;
+  physical_ = view.physical;
   geoms_.clear();
   for (int i = 0; i < view.num_geoms; ++i)
     if (view.geoms[i].fixed) geoms_.push_back(view.geoms[i]);
@@ -56,7 +57,7 @@ bool FixedLayer::settles(const View& view) {
 }
 
 bool FixedLayer::same(const View& view) const {
-  if (grid_ != view.grid) return false;
+  if (grid_ != view.grid || physical_ != view.physical) return false;
   if (!std::ranges::equal(lights_, std::span(view.lights, view.num_lights))) return false;
   std::size_t next = 0;
   for (int i = 0; i < view.num_geoms; ++i) {

@@ -43,6 +43,7 @@ class FixedLayer {
   bool made_ = false;
   // Inputs of the tiles.
   PixelGrid grid_;
+  PhysicalView physical_;
   std::vector<ViewGeom> geoms_;
   std::vector<ViewLight> lights_;
 };

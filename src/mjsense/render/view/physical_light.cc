@@ -76,9 +76,9 @@ void turn(const double m[3][3], const float r[9], double out[3][3]) {
     }
 }
 
-void set_irradiance(const EnvironmentLight& light, double scale, PhysicalView& out) {
+void set_irradiance(const EnvironmentLight& light, const Rgb64& scales, PhysicalView& out) {
   for (int c = 0; c < 3; ++c) {
-    const auto k = [&](int i) { return scale * light.irradiance[i][c]; };
+    const auto k = [&](int i) { return scales[c] * light.irradiance[i][c]; };
     const double quadratic[3][3] = {
         {k(8), k(4) / 2, k(7) / 2}, {k(4) / 2, -k(8), k(5) / 2}, {k(7) / 2, k(5) / 2, 3 * k(6)}};
     const double linear[3] = {k(3), k(1), k(2)};
@@ -102,7 +102,16 @@ void set_irradiance(const EnvironmentLight& light, double scale, PhysicalView& o
 
 double maximum_radiance(double exposure) { return 1 / exposure_scale(exposure); }
 
-void set_physical(const PhysicalOptions& options, const double rotation[9], PhysicalView& out) {
+Rgb64 environment_factors(const float diffuse[3], float intensity) {
+  if (!(intensity > 0)) return {1, 1, 1};
+  Rgb64 out;
+  for (int c = 0; c < 3; ++c)
+    out[c] = diffuse[c] * intensity / (std::numbers::pi * kEnvironmentLevel * kClassicRadiance);
+  return out;
+}
+
+void set_physical(const PhysicalOptions& options, const Rgb64& tint, const double rotation[9],
+                  PhysicalView& out) {
   static const std::vector<std::uint32_t> specular_table = pack_specular_table();
   out.on = true;
   set_curves(options.tone_mapping, out);
@@ -125,8 +134,12 @@ void set_physical(const PhysicalOptions& options, const double rotation[9], Phys
   const EnvironmentLight& light = options.environment->light;
   out.radiance = &light.radiance;
   const double scale = kEnvironmentLevel * options.environment_intensity * out.unit;
-  out.radiance_scale = static_cast<float>(scale);
-  set_irradiance(light, scale, out);
+  Rgb64 scales{scale, scale, scale};
+  for (int c = 0; c < 3; ++c) {
+    if (options.follows_image_light) scales[c] *= tint[c];
+    out.radiance_scale[c] = static_cast<float>(scales[c]);
+  }
+  set_irradiance(light, scales, out);
 }
 
 void set_physical(const PhysicalOptions& options, float intensity, float range, ViewLight& light) {

@@ -32,11 +32,19 @@ struct PhysicalOptions {
   double environment_intensity = 1;
   double environment_rotation = 0;  // degrees, about the world's z axis
   float occlusion_reach = 0.5f;     // m; 0: no ambient occlusion
+  bool follows_image_light =
+      false;             // the environment is the model's image light, with its strength
   int path_samples = 0;  // per pixel of path-traced images; 0: images are not path-traced
 };
 
-// Sets `out` for a camera whose rotation (R_WC, row-major) is given, except `reflectance`.
-void set_physical(const PhysicalOptions& options, const double rotation[9], PhysicalView& out);
+// Factors of the environment for an image light of this colour and intensity, lux: the illuminance of
+// a surface in a uniform environment. 1 where the intensity, 0, is not set.
+Rgb64 environment_factors(const float diffuse[3], float intensity);
+
+// Sets `out` for a camera whose rotation (R_WC, row-major) is given, except `reflectance`. `tint`:
+// environment_factors() of the world's image light.
+void set_physical(const PhysicalOptions& options, const Rgb64& tint, const double rotation[9],
+                  PhysicalView& out);
 
 // Turns the colours of a classic light into radiance. intensity: in candela, or in lux for a directional
 // light; 0: not set. range: m, used with an intensity.

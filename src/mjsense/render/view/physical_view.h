@@ -43,7 +43,7 @@ struct PhysicalView {
   float irradiance[10][3] = {};
   // The environment's radiance by perceptual roughness / (levels - 1), see EnvironmentLight
   const Texture* radiance = nullptr;
-  float radiance_scale = 0;
+  float radiance_scale[3] = {};
   float r_ec[9] = {};              // R_EC, row-major, E: frame of `radiance`
   bool shows_environment = false;  // as the background, instead of a skybox
   float white_radiance = 1;        // cd/m^2 of a radiance of 1

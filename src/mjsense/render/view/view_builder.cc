@@ -151,7 +151,7 @@ const View& ViewBuilder::build(const rays::RayWorld& world, const rays::SharedGe
                                const PixelGrid& grid) {
   view_.grid = grid;
   if (options_.physical.on) {
-    set_physical(options_.physical, rotation, view_.physical);
+    set_physical(options_.physical, appearance.environment_tint(), rotation, view_.physical);
     view_.physical.shows_environment = !view_.skybox;
   }
   order_.clear();
@@ -259,7 +259,8 @@ const View& ViewBuilder::build(const DrawnScene& scene, const double position[3]
   view_.grid = grid;
   view_.shows_plane_backs = true;
   view_.physical = {};
-  if (scene.physical) set_physical(*scene.physical, rotation, view_.physical);
+  if (scene.physical)
+    set_physical(*scene.physical, scene.environment_tint, rotation, view_.physical);
   projected_ = scene.projected_textures;
   sized_soft_ = scene.sized_soft_textures;
   view_.near = scene.near;

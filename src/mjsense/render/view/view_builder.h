@@ -73,6 +73,7 @@ struct DrawnScene {
   const PhysicalOptions* physical;  // null: classic
   // By light, for physically based shading: candela or lux (0: not set), m.
   std::span<const float> intensities, ranges;
+  Rgb64 environment_tint{1, 1, 1};  // environment_factors() of the image light
 };
 
 // Computes Surface::highlight_threshold: the value below which the kernels' power() returns 0, with a margin for

@@ -192,6 +192,11 @@ void CameraSensor::allocate_workspace(const SensorInit& init) {
   render::ViewOptions options = view_options(cfg_, colored(), near_, far_);
   options.markers = max_markers();
   if (colored()) options.physical = physical_options(cfg_, model_);
+  response_.reset();
+  if (rgb_ && needs_response(cfg_)) {
+    response_ = std::make_unique<CameraResponse>(cfg_, options.physical, init.num_worlds);
+    if (!hdr_) response_->keep_radiance();
+  }
   options.layered = fixed_layers_ != nullptr;
   for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *assets_, options);
   if (options.physical.path_samples > 0) {
@@ -282,6 +287,7 @@ bool CameraSensor::is_due(const World& world, std::int64_t& image) const {
 
 void CameraSensor::reset(const World& world) {
   if (optical_flow_) optical_flow_->reset(world.id);
+  if (response_) response_->reset(world.id);
 }
 
 void CameraSensor::compute(const World& world) {
@@ -298,6 +304,8 @@ void CameraSensor::compute(const World& world) {
   w.markers.copy(m, world.data);  // poses of sites, paths of tendons
   if (optical_flow_) optical_flow_->take(world, w.grid);
   w.rng = world.rng(stream_of(name()));
+  w.colour_rng = world.rng(stream_of(name() + "/rgb"));
+  w.time = world.time();
   std::ranges::copy(render::intrinsic_matrix(w.grid),
                     intrinsics_->data.row<float>(world.id).begin());
   const double* p = world.data->cam_xpos + 3 * camera_;
@@ -314,7 +322,11 @@ void CameraSensor::compute(const World& world) {
 // Targets in the fields of this world; buffers of this thread for those that only derive() needs.
 render::ImageTargets CameraSensor::targets(int world, int thread) {
   render::ImageTargets t;
-  if (rgb_) t.rgb = rgb_->data.row<std::uint8_t>(world).data();
+  if (response_) {
+    t.hdr = response_->radiance(world);
+  } else if (rgb_) {
+    t.rgb = rgb_->data.row<std::uint8_t>(world).data();
+  }
   if (hdr_) t.hdr = hdr_->data.row<float>(world).data();
   if (depth_) t.depth = depth_->data.row<float>(world).data();
   if (segmentation_) t.segmentation = segmentation_->data.row<std::int32_t>(world).data();
@@ -365,8 +377,19 @@ void CameraSensor::cast(const CastContext& context) {
   for (int id : context.ids)
     if (worlds_[id].due) due_.push_back(id);
   render_due(context);
+  if (response_) develop(context);
   if (!clean_.empty()) add_noise(context);
   for (int id : due_) worlds_[id].due = false;
+}
+
+void CameraSensor::develop(const CastContext& context) {
+  context.pool.run(static_cast<int>(due_.size()), [&](int item, int) {
+    const int id = due_[item];
+    const PerWorld& w = worlds_[id];
+    response_->develop(id, w.time, w.grid, w.colour_rng,
+                       hdr_ ? hdr_->data.row<float>(id).data() : response_->radiance(id),
+                       rgb_->data.row<std::uint8_t>(id).data());
+  });
 }
 
 void CameraSensor::add_noise(const CastContext& context) {

@@ -14,6 +14,7 @@
 #include "mjsense/render/view/markers.h"
 #include "mjsense/render/view/surface_assets.h"
 #include "mjsense/render/view/view_builder.h"
+#include "mjsense/sensors/camera/camera_response.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 #include "mjsense/sensors/camera/optical_flow.h"
 #include "mjsense/sensors/camera/pixel_owners.h"
@@ -55,6 +56,8 @@ class CameraSensor final : public Sensor {
     std::int64_t image = -1;  // number of the current image, if there is an update period
     bool due = false;
     Rng rng{0, 0, 0, 0};  // at the time of the image
+    Rng colour_rng{0, 0, 0, 0};
+    double time = 0;  // s, since the reset
   };
   std::string context() const;  // for errors: "camera 'NAME'"
   bool wants(std::string_view type) const;
@@ -70,6 +73,7 @@ class CameraSensor final : public Sensor {
   void declare_fields(int num_worlds);
   void render_due(const CastContext& context);
   void add_noise(const CastContext& context);
+  void develop(const CastContext& context);
   render::PixelGrid grid_in(const mjModel* model) const;
   void check_grid(const render::PixelGrid& grid) const;
   bool is_due(const World& world, std::int64_t& image) const;
@@ -106,6 +110,7 @@ class CameraSensor final : public Sensor {
   std::unique_ptr<render::FixedLayers> fixed_layers_;  // null: not useful, or the camera moves
   std::unique_ptr<OpticalFlow> optical_flow_;          // null: not requested
   std::unique_ptr<PixelOwners> owners_;                // null: not requested
+  std::unique_ptr<CameraResponse> response_;           // null: the kernels make the colours
   Field *rgb_ = nullptr, *hdr_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr,
         *bodies_ = nullptr, *entities_ = nullptr, *normals_ = nullptr, *points_ = nullptr,
         *flow_ = nullptr;

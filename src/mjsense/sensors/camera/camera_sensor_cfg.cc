@@ -14,6 +14,7 @@
 #include "mjsense/core/fields/sensor_fields.h"
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/sensors/camera/camera_data.h"
+#include "mjsense/sensors/camera/camera_response.h"
 #include "mjsense/sensors/camera/camera_sensor.h"
 
 namespace mjsense::sensors {
@@ -85,6 +86,13 @@ void validate(const CameraSensorCfg& cfg) {
   }
   if (cfg.shading == Shading::kClassic && std::ranges::count(cfg.data_types, "hdr"))
     fail("data type 'hdr' needs shading 'pbr' or 'path'");
+  if (cfg.shading == Shading::kClassic && needs_response(cfg))
+    fail(
+        "exposure_mode 'auto' and imager need linear radiance, thus shading 'pbr' or 'path'; it is "
+        "'classic'");
+  if (cfg.imager != Imager::kNone && cfg.imager_values)
+    fail(fmt::format("imager is '{}' and imager_values are given: set only one of them",
+                     cfg.imager.text()));
   const auto has_depth = std::count(cfg.data_types.begin(), cfg.data_types.end(), "depth") > 0;
   if (cfg.depth_noise != DepthNoise::kNone &&
       (!has_depth || cfg.depth_kind != DepthKind::kPlanar || cfg.orthographic))

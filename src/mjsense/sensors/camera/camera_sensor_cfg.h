@@ -83,6 +83,34 @@ void visit_fields(V& v, LensDistortion& c) {
 // Throws ValueError unless there are as many coefficients as the model needs.
 void validate(const LensDistortion& lens, std::string_view context);
 
+// Of an image sensor and its lens; camera_response.h has the formulas.
+struct ImagerCfg {
+  double full_well = 4300;
+  double read_noise = 1.7;
+  int bits = 10;
+  double f_number = 2;
+  double exposure_time = 1.0 / 30;
+  double vignetting = 0;
+};
+template <class V>
+void visit_fields(V& v, ImagerCfg& c) {
+  v.object("ImagerCfg", "The image sensor of a camera: noise, quantisation and vignetting.")
+      .frozen();
+  v("full_well", c.full_well, "Electrons of a saturated pixel.").unit("electrons").positive();
+  v("read_noise", c.read_noise, "Standard deviation of the noise of reading a pixel.")
+      .unit("electrons")
+      .at_least(0);
+  v("bits", c.bits, "Bits of a value of the analogue-to-digital converter.").within(1, 16);
+  v("f_number", c.f_number, "Focal length divided by the diameter of the aperture.").positive();
+  v("exposure_time", c.exposure_time,
+    "Longest exposure; darker images than it allows are amplified.")
+      .unit("s")
+      .positive();
+  v("vignetting", c.vignetting,
+    "Share of natural vignetting, cos^4 of the angle to the optical axis, that is not corrected.")
+      .within(0, 1);
+}
+
 struct CameraVizCfg {
   bool show_frustum = true, show_frame = true;
   double frustum_depth = 0;
@@ -148,6 +176,7 @@ struct CameraSensorCfg : SensorCfg, RgbCfg {
   NamedEnum<DepthKind> depth_kind;
   std::optional<CameraIntrinsics> intrinsics;
   LensDistortion distortion;
+  std::optional<ImagerCfg> imager_values;
   NamedEnum<DepthNoise> depth_noise;
   NamedEnum<CameraRenderer> renderer;
   bool debug_vis = false;
@@ -229,6 +258,7 @@ void visit_fields(V& v, CameraSensorCfg& c) {
   v("intrinsics", c.intrinsics,
     "Intrinsic parameters; they replace fovy and the parameters of the MJCF.");
   v("distortion", c.distortion, "Lens distortion; the image is not rectified.");
+  v("imager_values", c.imager_values, "An image sensor of other values than those of ``imager``.");
   v("depth_noise", c.depth_noise,
     "Error model of a stereo camera, applied to ``depth``; the other fields stay exact.");
   v("renderer", c.renderer, "opengl: MuJoCo's own renderer, if it was built in.");

@@ -21,6 +21,14 @@ constexpr std::array<std::string_view, 4> enum_names(ToneMap) {
   return {"neutral", "filmic", "linear", "agx"};
 }
 
+enum class ExposureMode { kFixed, kAuto };
+constexpr std::array<std::string_view, 2> enum_names(ExposureMode) { return {"fixed", "auto"}; }
+
+enum class Imager { kNone, kD435, kZedMini };
+constexpr std::array<std::string_view, 3> enum_names(Imager) {
+  return {"none", "d435", "zed_mini"};
+}
+
 // Options of colour images that each camera sensor has. A new one is an option of recordings and
 // renderings too, and is stored with the settings of a recording.
 struct RgbCfg {
@@ -29,7 +37,10 @@ struct RgbCfg {
   NamedEnum<Shading> shading;
   int samples_per_pixel = 64;
   double exposure = 8;
-  NamedEnum<ToneMap> tone_mapping;
+  NamedEnum<ExposureMode> exposure_mode;
+  double exposure_time_constant = 0.5;
+  NamedEnum<Imager> imager;
+  NamedEnum<ToneMap> tone_mapping = ToneMap::kFilmic;
   double white_balance = 6504;
   std::string environment = "model";
   double environment_intensity = 1;
@@ -63,6 +74,17 @@ void visit_fields(V& v, RgbCfg& c) {
   v("exposure", c.exposure, "Exposure in EV at ISO 100; 1 more halves the brightness.")
       .within(-10, 30)
       .decides_data();
+  v("exposure_mode", c.exposure_mode,
+    "auto: a meter chooses the exposure of each world, instead of ``exposure``.")
+      .decides_data();
+  v("exposure_time_constant", c.exposure_time_constant,
+    "Time in which the automatic exposure covers 63 % of a change; 0: it follows at once.")
+      .unit("s")
+      .within(0, 1e6)
+      .decides_data();
+  v("imager", c.imager,
+    "Photon and read noise, vignetting and quantisation of the colour sensor of a real camera.")
+      .decides_data();
   v("tone_mapping", c.tone_mapping,
     "From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; "
     "linear: clips; agx: bright colours become white.")
@@ -75,7 +97,7 @@ void visit_fields(V& v, RgbCfg& c) {
     "Light from the surroundings. model: the model's image light, else studio; auto: its image "
     "light, else its skybox, else studio; skybox: its skybox; studio: a neutral bright room; or "
     "the "
-    "path of an .hdr file, which is also the background.")
+    "path of an .hdr or .exr file, which is also the background.")
       .decides_data();
   v("environment_intensity", c.environment_intensity, "Factor of the light from the surroundings.")
       .within(0, 1e6)

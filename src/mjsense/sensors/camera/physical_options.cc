@@ -16,6 +16,8 @@ render::PhysicalOptions physical_options(const RgbCfg& cfg, const mjModel* model
   out.white_balance = cfg.white_balance;
   out.environment = render::environment(model, cfg.environment);
   out.hides_skybox = render::is_environment_file(cfg.environment);
+  out.follows_image_light = (cfg.environment == "model" || cfg.environment == "auto") &&
+                            render::image_light_of(model) >= 0;
   out.environment_intensity = cfg.environment_intensity;
   out.environment_rotation = cfg.environment_rotation;
   if (cfg.shading == Shading::kPath) out.path_samples = cfg.samples_per_pixel;

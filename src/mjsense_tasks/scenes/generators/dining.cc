@@ -31,13 +31,13 @@ scene::ModelSource make_dining(GeneratorInput& input, SceneFileCfg& cfg) {
   RoomWriter room("dining");
   write_shell_finishes(room, rng);
   const Colour wood = wood_colour(rng);
-  const Gloss satin{.specular = 0.2, .shininess = 0.4};
-  room.tiled("table", boards_png(wood, 8, rng.next()), 1.0, satin);
-  room.wrapped("table_edge", wood_png(brighter(wood, 0.85), rng.next()), satin);
+  const Gloss satin{.specular = 0.2, .shininess = 0.4, .roughness = 0.45};
+  room.tiled("table", boards_picture(wood, 8, rng.next()), 1.0, satin);
+  room.wrapped("table_edge", wood_picture(brighter(wood, 0.85), rng.next()), satin);
   const auto seat = rng.next();
-  room.wrapped("chair", wood_png(wood_colour(rng), seat), satin);
+  room.wrapped("chair", wood_picture(wood_colour(rng), seat), satin);
   const auto rug = rng.next();
-  room.tiled("rug", cloth_png(pick(rng, kRugs), rug), 0.5);
+  room.tiled("rug", cloth_picture(pick(rng, kRugs), rug), 0.5);
   room.plain("frame", pick(rng, kFrames), satin);
   write_picture(room, "picture", rng);
 

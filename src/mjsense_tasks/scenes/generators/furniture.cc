@@ -307,23 +307,25 @@ void write_furniture_materials(RoomWriter& out, Rng& rng) {
                                {0.25, 0.40, 0.30},
                                {0.72, 0.52, 0.22}};
   constexpr Colour kPots[] = {{0.70, 0.45, 0.34}, {0.82, 0.80, 0.76}, {0.35, 0.38, 0.40}};
-  const Gloss polished{0.25, 0.4}, matt{0.02, 0.05};
+  const Gloss polished{.specular = 0.25, .shininess = 0.4, .roughness = 0.45}, matt{0.02, 0.05};
   const auto around = [&](Colour c) { return brighter(c, rng.uniform(0.9, 1.1)); };
   const Colour wood = wood_colour(rng);
-  out.wrapped("wood", wood_png(wood, rng.next()), polished);
+  out.wrapped("wood", wood_picture(wood, rng.next()), polished);
   out.plain("dark_wood", brighter(wood, 0.55), polished);
   out.plain("white_wood", around({0.86, 0.85, 0.82}), polished);
   const auto first = rng.below(8);
   for (std::uint32_t i = 0; i < 3; ++i) {
     const auto threads = rng.next();
     out.wrapped(fmt::format("cloth_{}", i + 1),
-                cloth_png(around(kCloths[(first + 3 * i) % 8]), threads), matt);
+                cloth_picture(around(kCloths[(first + 3 * i) % 8]), threads), matt);
   }
   out.plain("sheet", around({0.90, 0.89, 0.86}), matt);
   for (int i = 0; i < 5; ++i) out.plain(fmt::format("book_{}", i), around(kBooks[i]));
-  out.plain("steel", {0.60, 0.61, 0.63}, {0.7, 0.7});
+  out.plain("steel", {0.60, 0.61, 0.63},
+            {.specular = 0.7, .shininess = 0.7, .metallic = 1, .roughness = 0.35});
   out.plain("black", {0.07, 0.07, 0.08}, {0.3, 0.5});
-  out.plain("screen", {0.05, 0.06, 0.08}, {0.8, 0.9, 0.06});
+  out.plain("screen", {0.05, 0.06, 0.08},
+            {.specular = 0.8, .shininess = 0.9, .reflectance = 0.06, .roughness = 0.05});
   out.plain("pot", around(pick(rng, kPots)));
   out.plain("soil", {0.20, 0.14, 0.10});
   out.plain("leaf_1", around({0.20, 0.42, 0.20}), {0.15, 0.3});
@@ -335,7 +337,7 @@ void write_furniture_materials(RoomWriter& out, Rng& rng) {
 }
 
 void write_picture(RoomWriter& out, const std::string& name, Rng& rng) {
-  out.texture(name, landscape_png(rng.next()), false);
+  out.texture(name, landscape_picture(rng.next()), false);
   out.asset(fmt::format("<material name=\"{0}\" texture=\"{0}\" specular=\"0.05\"/>\n", name));
 }
 

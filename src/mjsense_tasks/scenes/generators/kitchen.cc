@@ -27,44 +27,48 @@ struct Placed {
 
 void materials(RoomWriter& room, Rng& rng) {
   write_shell_finishes(room, rng);
-  const Gloss satin{.specular = 0.2, .shininess = 0.4};
+  const Gloss satin{.specular = 0.2, .shininess = 0.4, .roughness = 0.45};
   const bool of_wood = rng.below(2) == 0;
   const auto front = rng.next();
-  room.wrapped("front",
-               of_wood ? wood_png(wood_colour(rng), front) : plaster_png(paint_colour(rng), front),
-               satin);
+  room.wrapped(
+      "front",
+      of_wood ? wood_picture(wood_colour(rng), front) : plaster_picture(paint_colour(rng), front),
+      satin);
   room.plain("carcass", {0.86, 0.86, 0.84}, {.specular = 0.1, .shininess = 0.3});
-  room.wrapped("inside", wood_png({0.80, 0.70, 0.56}, rng.next()));
+  room.wrapped("inside", wood_picture({0.80, 0.70, 0.56}, rng.next()));
   room.plain("plinth", {0.18, 0.18, 0.19});
   const bool of_stone = rng.below(3) > 0;
   const auto worktop = rng.next();
   if (of_stone) {
-    room.tiled("worktop", stone_png(pick(rng, kStones), worktop), 0.6,
-               {.specular = 0.4, .shininess = 0.6, .reflectance = 0.04});
+    room.tiled("worktop", stone_picture(pick(rng, kStones), worktop), 0.6,
+               {.specular = 0.4, .shininess = 0.6, .reflectance = 0.04, .roughness = 0.25});
   } else {
-    room.tiled("worktop", planks_png(wood_colour(rng), 10, worktop), 0.8, satin);
+    room.tiled("worktop", planks_picture(wood_colour(rng), 10, worktop), 0.8, satin);
   }
   const Colour splash = pick(rng, kSplash), joint = mix(splash, {0.75, 0.74, 0.72}, 0.7);
   const auto tiles = rng.next();
-  room.tiled("splash", tiles_png(splash, joint, 4, rng.below(2) == 0, tiles), 0.6,
-             {.specular = 0.4, .shininess = 0.6});
-  room.wrapped("steel", brushed_png({0.66, 0.67, 0.68}, rng.next()),
-               {.specular = 0.6, .shininess = 0.6});
+  room.tiled("splash", tiles_picture(splash, joint, 4, rng.below(2) == 0, tiles), 0.6,
+             {.specular = 0.4, .shininess = 0.6, .roughness = 0.2});
+  room.wrapped("steel", brushed_picture({0.66, 0.67, 0.68}, rng.next()),
+               {.specular = 0.6, .shininess = 0.6, .metallic = 1, .roughness = 0.35});
   const Colour metals[] = {{0.70, 0.71, 0.72}, {0.16, 0.16, 0.17}, {0.66, 0.54, 0.34}};
-  room.plain("handle", pick(rng, metals), {.specular = 0.7, .shininess = 0.7});
-  room.plain("glass", {0.06, 0.06, 0.07}, {.specular = 0.7, .shininess = 0.8, .reflectance = 0.06});
+  room.plain("handle", pick(rng, metals),
+             {.specular = 0.7, .shininess = 0.7, .metallic = 1, .roughness = 0.35});
+  room.plain("glass", {0.06, 0.06, 0.07},
+             {.specular = 0.7, .shininess = 0.8, .reflectance = 0.06, .roughness = 0.05});
   room.plain("ring", {0.35, 0.35, 0.36});
   room.glowing("display", {0.25, 0.75, 0.70}, 0.7);
   room.plain("oven_inside", {0.20, 0.20, 0.21});
   const bool white = rng.below(2) == 0;
-  room.wrapped("fridge",
-               brushed_png(white ? Colour{0.88, 0.88, 0.87} : Colour{0.68, 0.69, 0.70}, rng.next()),
-               {.specular = 0.4, .shininess = 0.5});
+  room.wrapped(
+      "fridge",
+      brushed_picture(white ? Colour{0.88, 0.88, 0.87} : Colour{0.68, 0.69, 0.70}, rng.next()),
+      {.specular = 0.4, .shininess = 0.5, .metallic = white ? 0.0 : 1.0, .roughness = 0.4});
   room.plain("fridge_inside", {0.93, 0.94, 0.95});
   room.plain("appliance", rng.below(2) == 0 ? Colour{0.80, 0.80, 0.79} : Colour{0.22, 0.22, 0.23},
              {.specular = 0.4, .shininess = 0.5});
   room.plain("jar", mix({0.80, 0.62, 0.45}, {0.55, 0.65, 0.70}, rng.uniform()), satin);
-  room.wrapped("board", wood_png({0.62, 0.46, 0.30}, rng.next()));
+  room.wrapped("board", wood_picture({0.62, 0.46, 0.30}, rng.next()));
   room.plain("leaf", {0.24, 0.44, 0.22});
 }
 

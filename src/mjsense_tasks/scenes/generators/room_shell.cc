@@ -59,7 +59,7 @@ void write_shell(RoomWriter& room, const ShellCfg& s) {
   room.box({x, y, s.height - 0.02}, {0.22, 0.22, 0.02}, "lamp_glass", kNoContacts);
   room.add(
       fmt::format("<light name=\"lamp\" type=\"point\" bulbradius=\"0.12\" pos=\"{} {} {}\" "
-                  "diffuse=\"0.52 0.50 "
+                  "intensity=\"2800\" diffuse=\"0.52 0.50 "
                   "0.47\" specular=\"0.25 0.25 0.25\" attenuation=\"1 0 0\" castshadow=\"true\"/>",
                   x, y, s.height - 0.16));
   room.add(
@@ -74,6 +74,13 @@ void write_bounce_light(RoomWriter& room) {
   room.add(
       "<light name=\"bounce\" type=\"directional\" dir=\"0 0 -1\" ambient=\"0.20 0.20 0.20\" "
       "diffuse=\"0 0 0\" specular=\"0 0 0\" castshadow=\"false\"/>");
+  // A white ceiling above a darker floor.
+  room.asset(
+      "<texture name=\"surroundings\" type=\"cube\" builtin=\"gradient\" rgb1=\"0.95 0.94 0.92\" "
+      "rgb2=\"0.60 0.55 0.50\" width=\"32\" height=\"32\"/>\n");
+  room.add(
+      "<light name=\"surroundings\" type=\"image\" texture=\"surroundings\" intensity=\"480\" "
+      "diffuse=\"1 1 1\" ambient=\"0 0 0\" specular=\"0 0 0\"/>");
 }
 
 }  // namespace mjsense::tasks::scenes

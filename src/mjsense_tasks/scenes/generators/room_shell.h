@@ -11,9 +11,10 @@ struct ShellCfg {
   double window_x = 0, sill = 1.0, window_wide = 1.2, window_high = 1.1;
 };
 // Uses the materials of write_shell_finishes(). Names of the geoms: floor, ceiling, wall_x0,
-// wall_x1, wall_y0, wall_y1; of the lights: lamp, daylight, bounce.
+// wall_x1, wall_y0, wall_y1; of the lights: lamp, daylight, bounce, surroundings.
 void write_shell(RoomWriter& room, const ShellCfg& shell);
-// The light `bounce`: ambient light, which stands in for what walls reflect. Moods can colour it.
+// The light that walls, floor and ceiling reflect to each other, which moods can colour: `bounce` is
+// the ambient light of classic images, and the image light `surroundings` that of physically based ones.
 void write_bounce_light(RoomWriter& room);
 
 }  // namespace mjsense::tasks::scenes

@@ -16,8 +16,11 @@ std::string ends(Vec3 from, Vec3 to, double radius) {
 }
 
 std::string gloss_text(Gloss gloss) {
-  return fmt::format("specular=\"{}\" shininess=\"{}\" reflectance=\"{}\"", gloss.specular,
-                     gloss.shininess, gloss.reflectance);
+  std::string out = fmt::format("specular=\"{}\" shininess=\"{}\" reflectance=\"{}\"",
+                                gloss.specular, gloss.shininess, gloss.reflectance);
+  if (gloss.metallic > 0) out += fmt::format(" metallic=\"{}\"", gloss.metallic);
+  if (gloss.roughness >= 0) out += fmt::format(" roughness=\"{}\"", gloss.roughness);
+  return out;
 }
 
 // Axes of a side that faces this direction: x to the right and y up in the texture, z outwards.
@@ -64,29 +67,41 @@ void RoomWriter::plain(std::string_view name, Colour c, Gloss gloss) {
                          c[1], c[2], gloss_text(gloss));
 }
 
-void RoomWriter::glowing(std::string_view name, Colour c, double emission) {
+void RoomWriter::glowing(std::string_view name, Colour c, double emission, std::string_view shown) {
   assets_ += fmt::format(
-      "<material name=\"{}\" rgba=\"{:.4f} {:.4f} {:.4f} 1\" emission=\"{}\" specular=\"0\"/>\n",
-      name, c[0], c[1], c[2], emission);
+      "<material name=\"{}\" rgba=\"{:.4f} {:.4f} {:.4f} 1\" emission=\"{}\" specular=\"0\">{}"
+      "</material>\n",
+      name, c[0], c[1], c[2], emission,
+      shown.empty() ? "" : fmt::format("<layer texture=\"{}\" role=\"emissive\"/>", shown));
 }
 
-void RoomWriter::texture(std::string_view name, std::string png, bool wrapped) {
-  const std::string file = fmt::format("{}_{}.png", name_, name);
-  assets_ += fmt::format("<texture name=\"{}\" type=\"{}\" file=\"{}\"/>\n", name,
-                         wrapped ? "cube" : "2d", file);
-  files_[file] = std::move(png);
+void RoomWriter::texture(std::string_view name, Picture picture, bool wrapped) {
+  const auto add = [&](const std::string& texture, std::string png) {
+    const std::string file = fmt::format("{}_{}.png", name_, texture);
+    assets_ += fmt::format("<texture name=\"{}\" type=\"{}\" file=\"{}\"/>\n", texture,
+                           wrapped ? "cube" : "2d", file);
+    files_[file] = std::move(png);
+  };
+  add(std::string(name), std::move(picture.colours));
+  if (!wrapped && !picture.normals.empty())
+    add(fmt::format("{}_normals", name), std::move(picture.normals));
 }
 
-void RoomWriter::tiled(std::string_view name, std::string png, double metres, Gloss gloss) {
-  texture(name, std::move(png), false);
+void RoomWriter::tiled(std::string_view name, Picture picture, double metres, Gloss gloss) {
+  const std::string normals =
+      picture.normals.empty()
+          ? ""
+          : fmt::format("<layer texture=\"{}_normals\" role=\"normal\"/>", name);
+  texture(name, std::move(picture), false);
   // With texuniform, texrepeat is the number of repetitions per metre.
   assets_ += fmt::format(
-      "<material name=\"{0}\" texture=\"{0}\" texuniform=\"true\" texrepeat=\"{1} {1}\" {2}/>\n",
-      name, 1 / metres, gloss_text(gloss));
+      "<material name=\"{0}\" texuniform=\"true\" texrepeat=\"{1} {1}\" {2}>"
+      "<layer texture=\"{0}\" role=\"rgb\"/>{3}</material>\n",
+      name, 1 / metres, gloss_text(gloss), normals);
 }
 
-void RoomWriter::wrapped(std::string_view name, std::string png, Gloss gloss) {
-  texture(name, std::move(png), true);
+void RoomWriter::wrapped(std::string_view name, Picture picture, Gloss gloss) {
+  texture(name, std::move(picture), true);
   assets_ += fmt::format("<material name=\"{0}\" texture=\"{0}\" {1}/>\n", name, gloss_text(gloss));
 }
 
@@ -146,7 +161,7 @@ void RoomWriter::leaf(Vec3 middle, Vec3 along, Vec3 flat, Vec3 half, std::string
 void RoomWriter::lamp(std::string_view name, Vec3 at, double brightness, double reach) {
   add(
       fmt::format("<light name=\"{}\" type=\"spot\" bulbradius=\"0.12\" cutoff=\"88\" "
-                  "exponent=\"1\" pos=\"{:.4g} {:.4g} {:.4g}\" "
+                  "exponent=\"1\" intensity=\"2800\" pos=\"{:.4g} {:.4g} {:.4g}\" "
                   "dir=\"0 0 -1\" diffuse=\"{:.4g} {:.4g} {:.4g}\" specular=\"0.15 0.15 0.15\" "
                   "attenuation=\"1 0 {:.4g}\" castshadow=\"true\"/>",
                   name, at.x, at.y, at.z, brightness, 0.97 * brightness, 0.91 * brightness,

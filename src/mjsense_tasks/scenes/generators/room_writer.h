@@ -16,9 +16,10 @@
 
 namespace mjsense::tasks::scenes {
 
-// Reflection properties of a material.
+// Reflection properties of a material. Physically based images use the last two; a negative roughness is
+// 1 - shininess.
 struct Gloss {
-  double specular = 0.1, shininess = 0.2, reflectance = 0;
+  double specular = 0.1, shininess = 0.2, reflectance = 0, metallic = 0, roughness = -1;
 };
 
 enum class Facing { kUp, kDown, kPlusX, kMinusX, kPlusY, kMinusY };
@@ -40,14 +41,15 @@ class RoomWriter {
   // --- materials
   void plain(std::string_view name, Colour colour, Gloss gloss = {});
   // For slab() and planes: the texture is repeated every `metres`.
-  void tiled(std::string_view name, std::string png, double metres, Gloss gloss = {});
+  void tiled(std::string_view name, Picture picture, double metres, Gloss gloss = {});
   // The texture is shown once on each face of a box, whatever the size of the box.
-  void wrapped(std::string_view name, std::string png, Gloss gloss = {});
+  void wrapped(std::string_view name, Picture picture, Gloss gloss = {});
   // A texture without a material, for `vary`. It must be of the same kind as the texture that it
-  // replaces.
-  void texture(std::string_view name, std::string png, bool wrapped);
+  // replaces. Its normal map is the texture <name>_normals, which wrapped textures do not have.
+  void texture(std::string_view name, Picture picture, bool wrapped);
   // A material that emits light: lamps, displays.
-  void glowing(std::string_view name, Colour colour, double emission);
+  // `shown`: the texture that it shows in physically based images, instead of its colour.
+  void glowing(std::string_view name, Colour colour, double emission, std::string_view shown = {});
 
   // --- geoms, added to the open body
   void box(Vec3 middle, Vec3 half, std::string_view material, const GeomOptions& options = {});

@@ -37,7 +37,8 @@ scene::ModelSource make_shelf(GeneratorInput& input, SceneFileCfg& cfg) {
   const bool painted = rng.below(3) == 0;
   const Colour colour = painted ? paint_colour(rng) : wood_colour(rng);
   const Gloss sheen{.specular = 0.15, .shininess = 0.35};
-  room.wrapped("case", painted ? plaster_png(colour, rng.next()) : wood_png(colour, rng.next()),
+  room.wrapped("case",
+               painted ? plaster_picture(colour, rng.next()) : wood_picture(colour, rng.next()),
                sheen);
   for (std::size_t i = 0; i < std::size(kSpines); ++i)
     room.plain(fmt::format("spine_{}", i), kSpines[i], {.specular = 0.1, .shininess = 0.2});

@@ -17,25 +17,27 @@ void write_table_materials(RoomWriter& room, Rng& rng) {
   write_shell_finishes(room, rng);
   write_furniture_materials(room, rng);
   write_picture(room, "painting", rng);
-  const Gloss satin{.specular = 0.2, .shininess = 0.4};
+  const Gloss satin{.specular = 0.2, .shininess = 0.4, .roughness = 0.45};
   const Colour wood = wood_colour(rng);
-  room.tiled("table", boards_png(wood, 7, rng.next()), 0.8, satin);
-  room.wrapped("table_edge", wood_png(brighter(wood, 0.8), rng.next()), satin);
-  const auto texture = [&](const char* name, std::string png) {
-    room.texture(name, std::move(png), false);
+  room.tiled("table", boards_picture(wood, 7, rng.next()), 0.8, satin);
+  room.wrapped("table_edge", wood_picture(brighter(wood, 0.8), rng.next()), satin);
+  const auto texture = [&](const char* name, Picture picture) {
+    room.texture(name, std::move(picture), false);
   };
-  texture("table_oak", boards_png({0.70, 0.55, 0.38}, 8, rng.next()));
-  texture("table_walnut", boards_png({0.40, 0.28, 0.19}, 6, rng.next()));
-  texture("table_birch", wood_png({0.80, 0.70, 0.55}, rng.next(), 512));
-  texture("table_stone", stone_png({0.58, 0.57, 0.55}, rng.next()));
-  texture("table_slate", stone_png({0.27, 0.28, 0.30}, rng.next()));
-  texture("table_laminate", plaster_png({0.80, 0.79, 0.76}, rng.next()));
-  texture("table_linen", cloth_png({0.66, 0.60, 0.50}, rng.next()));
-  texture("floor_planks", planks_png({0.55, 0.42, 0.30}, 8, rng.next()));
-  texture("floor_tiles", tiles_png({0.62, 0.60, 0.57}, {0.45, 0.44, 0.43}, 3, false, rng.next()));
-  texture("floor_carpet", cloth_png({0.44, 0.44, 0.46}, rng.next()));
-  texture("wall_bricks", tiles_png({0.74, 0.71, 0.67}, {0.66, 0.64, 0.61}, 8, true, rng.next()));
-  texture("wall_paper", cloth_png({0.78, 0.77, 0.73}, rng.next()));
+  texture("table_oak", boards_picture({0.70, 0.55, 0.38}, 8, rng.next()));
+  texture("table_walnut", boards_picture({0.40, 0.28, 0.19}, 6, rng.next()));
+  texture("table_birch", wood_picture({0.80, 0.70, 0.55}, rng.next(), 512));
+  texture("table_stone", stone_picture({0.58, 0.57, 0.55}, rng.next()));
+  texture("table_slate", stone_picture({0.27, 0.28, 0.30}, rng.next()));
+  texture("table_laminate", plaster_picture({0.80, 0.79, 0.76}, rng.next()));
+  texture("table_linen", cloth_picture({0.66, 0.60, 0.50}, rng.next()));
+  texture("floor_planks", planks_picture({0.55, 0.42, 0.30}, 8, rng.next()));
+  texture("floor_tiles",
+          tiles_picture({0.62, 0.60, 0.57}, {0.45, 0.44, 0.43}, 3, false, rng.next()));
+  texture("floor_carpet", cloth_picture({0.44, 0.44, 0.46}, rng.next()));
+  texture("wall_bricks",
+          tiles_picture({0.74, 0.71, 0.67}, {0.66, 0.64, 0.61}, 8, true, rng.next()));
+  texture("wall_paper", cloth_picture({0.78, 0.77, 0.73}, rng.next()));
 }
 
 void write_table(RoomWriter& room) {
