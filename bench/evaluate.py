@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Episodes per second of CPU time of one small policy (ACT, images of 64x64 pixels) in `mjsense evaluate` with 16 worlds and with
-one, which is the structure of MolmoSpaces' runner, and in LeRobot's `lerobot-eval` with lerobot_env_mjsense.
+"""Episodes per second of CPU time of one small policy (ACT, images of 64x64 pixels) in `mjsense evaluate` with 16 worlds, with
+and without videos, and with one world, which is the structure of MolmoSpaces' runner, and in LeRobot's `lerobot-eval` with
+lerobot_env_mjsense.
 
 Each program runs with few and with many episodes; the difference leaves out the time in which it starts. The policy is not
 trained, so that all episodes have the same length. The environment of tests/python/lerobot_environments.py is needed:

@@ -237,7 +237,7 @@ def test_automatic_exposure_follows_the_light() -> None:
     seen = grey()
     np.testing.assert_allclose(seen[0], 0.18, rtol=0.03)
     np.testing.assert_allclose(seen[1], 0.18 * (110 / 200) ** np.exp(-1), rtol=0.04)
-    np.testing.assert_array_equal(grey(), seen)  # reading again makes no image
+    np.testing.assert_array_equal(grey(), seen)  # a second read gives the same image
     lamp.sim.reset([1])
     np.testing.assert_allclose(grey(), 0.18, rtol=0.03)
 

@@ -84,8 +84,27 @@ def test_image_options_are_those_of_cameras_and_of_render():
     assert set(given) <= inspect.signature(mjs.render).parameters.keys()
 
 
-PHYSICAL = ("exposure", "tone_mapping", "white_balance", "environment", "environment_intensity", "environment_rotation", "ambient_occlusion")
-VALUES = {"shading": "pbr", "samples_per_pixel": 2, "tone_mapping": "agx", "environment": "auto", "white_balance": 4000}
+PHYSICAL = {
+    "exposure",
+    "exposure_mode",
+    "exposure_time_constant",
+    "imager",
+    "tone_mapping",
+    "white_balance",
+    "environment",
+    "environment_intensity",
+    "environment_rotation",
+    "ambient_occlusion",
+}
+VALUES = {
+    "shading": "pbr",
+    "samples_per_pixel": 2,
+    "exposure_mode": "auto",
+    "imager": "d435",
+    "tone_mapping": "agx",
+    "environment": "skybox",
+    "white_balance": 4000,
+}
 
 
 def write_sky(path):
@@ -103,6 +122,8 @@ def test_every_image_option_is_kept(option, tmp_path):
     value = VALUES.get(option, not default if isinstance(default, bool) else 4)
     made, physical = {}, {"shading": "pbr"} if option in PHYSICAL else {"shading": "path", **few} if few else {}
     given = {"environment": write_sky(tmp_path / "sky.hdr")} if option == "environment_rotation" else {}
+    if option == "exposure_time_constant":
+        physical["exposure_mode"] = "auto"
     physical |= given
     for name, given in (("usual", physical), ("data", {**physical, option: value})):
         mjs.record("pick", out=tmp_path / name, **{**RECORDING, "episodes": 1, "horizon": 3, **given})

@@ -153,7 +153,7 @@ class _Writer:
         # A shell: surfaces that are open or flat have no volume.
         ElementTree.SubElement(self._assets, "mesh", name=name, file=f"{name}.obj", inertia="shell")
         look = {"type": "mesh", "mesh": name, "contype": "0", "conaffinity": "0", "group": "2"}
-        ElementTree.SubElement(self._body, "geom", **look, **self._look(visual))
+        ElementTree.SubElement(self._body, "geom", {**look, **self._look(visual)})
         if contacts and _has_volume(vertices):
             ElementTree.SubElement(self._body, "geom", type="mesh", mesh=name, group="3")
 
@@ -220,7 +220,7 @@ class _Writer:
             name = self._files[key] = f"texture_{len(self._files)}"
             Image.fromarray(np.ascontiguousarray(pixels)).save(self._folder / f"{name}.png")
             space = {"colorspace": "linear"} if linear else {}
-            ElementTree.SubElement(self._assets, "texture", name=name, type="2d", file=f"{name}.png", **space)
+            ElementTree.SubElement(self._assets, "texture", {"name": name, "type": "2d", "file": f"{name}.png", **space})
         ElementTree.SubElement(material, "layer", texture=self._files[key], role=role)
 
     def save(self, path: Path) -> None:

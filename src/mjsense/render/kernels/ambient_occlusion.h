@@ -146,6 +146,22 @@ inline Float hidden_by(const ViewGeom& g, Vec3f p, Vec3f n, float reach) {
   return select(some, hidden_by_box(half, q, normal) * near, zero);
 }
 
+// Distance up to which a geom hides the environment, m.
+inline float reach_of(const View& view, const ViewGeom& g) {
+  const float reach = view.physical.occlusion_reach, own = 4 * g.radius;
+  return own < reach ? own : reach;
+}
+
+// Whether the geom's bounding sphere is near the point, and not wholly below the surface's horizon. It
+// takes a tenth of the time of hidden_by(), and most geoms of a tile's list are far from most of its
+// pixels.
+inline Mask may_hide(const ViewGeom& g, Vec3f p, Vec3f n, float reach) {
+  if (g.type == mjGEOM_PLANE) return splat(0.0f) < splat(1.0f);
+  const Vec3f to = splat(g.center) - p;
+  const float far = g.radius + reach;
+  return (dot(to, to) < splat(far * far)) & (splat(-g.radius) < dot(to, n));
+}
+
 // Part of the environment's light that reaches the points of `lanes`, 0..1.
 inline void open_sky(const View& view, const Occluders& near, const Surfaces& s, const Hits& hits,
                      std::uint32_t lanes, float* out) {
@@ -159,8 +175,9 @@ inline void open_sky(const View& view, const Occluders& near, const Surfaces& s,
         const Mask other = m & ~(own == int_of(near.list[i]));
         if (!any(other)) continue;
         const ViewGeom& g = view.geoms[near.list[i]];
-        const float reach = view.physical.occlusion_reach, own_reach = 4 * g.radius;
-        const Float hidden = hidden_by(g, p, n, own_reach < reach ? own_reach : reach);
+        const float reach = reach_of(view, g);
+        if (!any(other & may_hide(g, p, n, reach))) continue;
+        const Float hidden = hidden_by(g, p, n, reach);
         open = open * (splat(1.0f) - select(other, min(hidden, splat(1.0f)), splat(0.0f)));
       }
     }

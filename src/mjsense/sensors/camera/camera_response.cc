@@ -85,15 +85,18 @@ void CameraResponse::expose(State& state, double time, const float* radiance) co
     state.exposure = exposure_;
     return;
   }
-  const double target = metered(radiance), passed = time - state.time;
-  if (!state.metered) {
-    state.exposure = target;
-  } else if (passed > 0) {
-    const double share = time_constant_ > 0 ? 1 - std::exp(-passed / time_constant_) : 1;
-    state.exposure += share * (target - state.exposure);
+  // A world may be changed without a step: then its image replaces the one of the same time.
+  if (state.images == 0 || time > state.time) {
+    state.earlier_exposure = state.exposure;
+    state.earlier_time = state.time;
+    state.images = std::min(state.images + 1, 2);
+    state.time = time;
   }
-  state.metered = true;
-  state.time = time;
+  const double target = metered(radiance), passed = time - state.earlier_time;
+  state.exposure = target;
+  if (state.images == 1 || time_constant_ == 0) return;
+  const double left = std::exp(-passed / time_constant_);
+  state.exposure += left * (state.earlier_exposure - target);
 }
 
 void CameraResponse::develop(int world, double time, const render::PixelGrid& grid, Rng rng,

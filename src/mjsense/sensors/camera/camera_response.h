@@ -5,7 +5,8 @@
 //
 //   meter    the mean of log2 of the luminance L, over every fourth pixel of every fourth row, is shown as
 //            middle grey, 0.18: EV_target = mean(log2(L / (0.18 * 1.2))). The first image of an episode has
-//            this exposure; later ones follow it: EV += (EV_target - EV) (1 - exp(-dt / time_constant))
+//            this exposure; later ones follow it: EV += (EV_target - EV) (1 - exp(-dt / time_constant)),
+//            from the last image of an earlier time
 //   gain     exposure time and gain realise EV: t = min(longest, f_number^2 / 2^EV),
 //            gain = f_number^2 / (t 2^EV), 1 or more
 //   light    falls off by vignetting: 1 + vignetting (cos^4 - 1) of the angle to the optical axis
@@ -37,7 +38,7 @@ class CameraResponse {
                  int num_worlds);
 
   // The next image of the world is the first one.
-  void reset(int world) { states_[world].metered = false; }
+  void reset(int world) { states_[world].images = 0; }
   // Where the radiance of a world's images is kept if they have no field for it: [H, W, 3], cd/m^2.
   float* radiance(int world) { return states_[world].radiance.data(); }
   void keep_radiance();
@@ -50,8 +51,9 @@ class CameraResponse {
 
  private:
   struct State {
-    bool metered = false;
+    int images = 0;  // since the reset, at different times; counts to 2
     double exposure = 0, time = 0;
+    double earlier_exposure = 0, earlier_time = 0;  // of the last image of an earlier time
     std::vector<float> radiance;
   };
   double metered(const float* radiance) const;
