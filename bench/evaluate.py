@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Episodes per second of CPU time of one small policy (ACT, images of 64x64 pixels) in `mjsense evaluate` with 16 worlds and with
-one, which is the structure of MolmoSpaces' runner, and in LeRobot's `lerobot-eval` with lerobot_env_mjsense.
+"""Episodes per second of CPU time of one small policy (ACT, images of 64x64 pixels) in `mjsense evaluate` with 16 worlds, with
+and without videos, and with one world, which is the structure of MolmoSpaces' runner, and in LeRobot's `lerobot-eval` with
+lerobot_env_mjsense.
 
 Each program runs with few and with many episodes; the difference leaves out the time in which it starts. The policy is not
 trained, so that all episodes have the same length. The environment of tests/python/lerobot_environments.py is needed:
@@ -50,7 +51,7 @@ def main() -> None:
         mjs.exporting.export_lerobot(folder / "data", folder / "out")
         cpu_seconds(ROOT / "tests/python/adapters/lerobot_act.py", folder / "out", folder / "act", "act", 1)
 
-        def ours(worlds: int, count: int) -> float:
+        def ours(worlds: int, count: int, *more: str) -> float:
             options = [
                 "--worlds",
                 worlds,
@@ -67,7 +68,7 @@ def main() -> None:
             ]
             return cpu_seconds(
                 *("-m", "mjsense", "evaluate", "pick", "--policy", f"lerobot:{folder / 'act'}", "--horizon", STEPS),
-                *("--threads", 1, "--out", folder / "results", "--overwrite", *options),
+                *("--threads", 1, "--out", folder / "results", "--overwrite", *options, *more),
             )
 
         def theirs(worlds: int, count: int) -> float:
@@ -88,6 +89,7 @@ def main() -> None:
 
         cases = (
             ("mjsense evaluate, 16 worlds", lambda count: ours(16, count), 16),
+            ("mjsense evaluate --no-videos, 16 worlds", lambda count: ours(16, count, "--no-videos"), 16),
             ("mjsense evaluate, one world", lambda count: ours(1, count), 2),
             ("lerobot-eval with lerobot_env_mjsense, 16 worlds", lambda count: theirs(16, count), 16),
         )

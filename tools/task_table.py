@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measures how often the planners succeed, by task and robot, and writes the table of docs/tasks.md.
 
-    python tools/task_table.py [--episodes 50] [--only TASK[/ROBOT]] [--perturb]
+    python tools/task_table.py [--episodes 50] [--only TASK[/ROBOT[/SCENE]] ...]
 
 Plays every pair of CASES without cameras. Each attempt is an episode with a different seed; failures are recorded, too. Scenes of
-packages that are not installed are skipped with a message. Pairs that are not played keep their rows of the page.
+packages that are not installed are skipped with a message. Pairs that are not played keep their rows of the page. The page is
+written after each pair.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import argparse
 import collections
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +28,7 @@ for build in ("release", "dev"):
         break
 
 import mjsense as mjs
+from mjsense.evaluation.intervals import wilson
 
 PAGE = ROOT / "docs" / "tasks.md"
 BEGIN, END = "<!-- task table -->", "<!-- end -->"
@@ -99,6 +102,7 @@ def play(task: str, robot: str, scene: str, episodes: int, **options: Any) -> di
         scenes = [f"{scene[:-1]}{house}" for house in range(HOUSES)]
         episodes = -(-episodes // HOUSES)
     parts, found = [], []
+    begun = time.process_time()
     for one in scenes:
         with tempfile.TemporaryDirectory() as out:
             made = mjs.record(
@@ -115,6 +119,7 @@ def play(task: str, robot: str, scene: str, episodes: int, **options: Any) -> di
             )
             found += episodes_of(made.path)
             parts.append(made)
+    seconds = time.process_time() - begun
     angles = approach_angles(found)
     lengths = [length for made in parts for length in made.lengths]
     failures: collections.Counter[str] = collections.Counter()
@@ -126,12 +131,11 @@ def play(task: str, robot: str, scene: str, episodes: int, **options: Any) -> di
         "robot": robot,
         "scene": scene,
         "episodes": played,
-        "success": sum(made.succeeded for made in parts) / played,
+        "succeeded": sum(made.succeeded for made in parts),
         "length": float(np.median(lengths)) if lengths else 0.0,
         "retried": sum(e["retries"] > 0 for e in found) / max(1, len(found)),
         "steep": sum(a < 30 for a in angles) / len(angles) if angles else None,
-        "steps_per_second": sum(made.steps for made in parts) / sum(made.seconds for made in parts),
-        "first_action_ms": 1000 * sum(made.times["reset"] for made in parts) / played,
+        "steps_per_second": sum(made.steps for made in parts) / seconds,
         "failures": failures.most_common(3),
     }
 
@@ -147,16 +151,17 @@ def label(task: str, robot: str, scene: str) -> str:
 def row(r: dict[str, Any]) -> str:
     slanted = "" if r["steep"] is None else f"{1 - r['steep']:.0%}"
     why = "; ".join(f"{count} {what}" for what, count in r["failures"])
+    low, high = wilson(r["succeeded"], r["episodes"])
     return (
-        f"{label(r['task'], r['robot'], r['scene'])} {r['success']:.0%} of {r['episodes']} | {r['length']:.0f} | "
-        f"{r['retried']:.0%} | "
-        f"{slanted} | {r['first_action_ms']:.0f} | {r['steps_per_second']:.0f} | {why} |"
+        f"{label(r['task'], r['robot'], r['scene'])} {r['succeeded']} of {r['episodes']} | "
+        f"{100 * low:.0f} to {100 * high:.0f} % | {r['length']:.0f} | {r['retried']:.0%} | {slanted} | "
+        f"{r['steps_per_second']:.0f} | {why} |"
     )
 
 
 def table(rows: list[str]) -> str:
     head = [
-        "| task | robot | success | steps | retried | slanted | first plan, ms | steps/s | failures |",
+        "| task | robot | successful | 95 % interval | steps | retried | slanted | steps per CPU second | failures |",
         "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | --- |",
     ]
     return "\n".join([*head, *rows])
@@ -165,26 +170,25 @@ def table(rows: list[str]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--episodes", type=int, default=50)
-    parser.add_argument("--only", default="", help="TASK, TASK/ROBOT or TASK/ROBOT/SCENE")
+    parser.add_argument("--only", nargs="*", default=[], metavar="TASK[/ROBOT[/SCENE]]")
     arguments = parser.parse_args()
-    text = PAGE.read_text()
-    before, rest = text.split(BEGIN, 1)
-    old, after = rest.split(END, 1)
-    rows = []
+    old = PAGE.read_text().split(BEGIN)[1].split(END)[0]
+    rows = {case: line for case in CASES for line in old.splitlines() if line.startswith(label(*case))}
     for case in CASES:
         task, robot, scene = case
-        kept = [line for line in old.splitlines() if line.startswith(label(*case))]
-        if arguments.only in ("", task, f"{task}/{robot}", f"{task}/{robot}/{scene}"):
-            try:
-                kept = [row(play(*case, arguments.episodes))]
-            except ValueError as error:
-                if "pip install" not in str(error):
-                    raise
-                print(f"{task}/{robot} in {scene}: skipped: {error}", flush=True)
-            else:
-                print(*kept, flush=True)
-        rows += kept
-    PAGE.write_text(f"{before}{BEGIN}\n{table(rows)}\n{END}{after}")
+        if arguments.only and not {task, f"{task}/{robot}", f"{task}/{robot}/{scene}"} & set(arguments.only):
+            continue
+        try:
+            rows[case] = row(play(*case, arguments.episodes))
+        except ValueError as error:
+            if "mjsense assets install" not in str(error):
+                raise
+            print(f"{task}/{robot} in {scene}: skipped: {error}", flush=True)
+            continue
+        print(rows[case], flush=True)
+        before, rest = PAGE.read_text().split(BEGIN, 1)
+        _, after = rest.split(END, 1)
+        PAGE.write_text(f"{before}{BEGIN}\n{table([rows[case] for case in CASES if case in rows])}\n{END}{after}")
 
 
 if __name__ == "__main__":

@@ -23,7 +23,8 @@ Where to look (``help(mjs.Simulation)`` and so on):
     episodes of tasks            make (gymnasium.Env), make_vec (gymnasium.vector.VectorEnv)
     making recordings            record: tasks by a policy; play: by hand, in the browser; RecordEpisodes: of any
                                  environment; Recorder: your own loop; mjsense.cluster: on many machines
-    evaluating policies          evaluate: the same episodes for every policy; mjsense.evaluation: benchmarks, comparison
+    evaluating policies          evaluate: the same episodes for every policy; wrap_policy: these policies in your own loop;
+                                 mjsense.evaluation: benchmarks, comparison
     reading recordings           Dataset: rows, frames, windows, statistics; replay, check_replay; render: other cameras
     editing recordings           delete_episodes, split_dataset, merge_datasets
     files of other programs      export; import_lerobot, import_robomimic
@@ -71,6 +72,7 @@ from mjsense.dataset.edit import delete_episodes, merge_datasets, split_dataset
 from mjsense.dataset.import_lerobot import import_lerobot
 from mjsense.dataset.import_robomimic import import_robomimic
 from mjsense.evaluation.playing import evaluate
+from mjsense.evaluation.timing import wrap_policy
 from mjsense.exporting import export
 from mjsense.recording import RecordEpisodes, Recorder
 from mjsense.rendering import Renderer
@@ -199,6 +201,7 @@ __all__ = [
     "split_dataset",
     "task_names",
     "view",
+    "wrap_policy",
     "__version__",
 ]
 

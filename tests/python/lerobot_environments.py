@@ -56,6 +56,19 @@ def environment(version):
     return python, str(folder) if version == "0.3.3" else ""
 
 
+def checkers():
+    """The Python of LeRobot 0.4.4's environment, the programs on PyPI that check LeRobot data sets, and the variables with which they run."""
+    python, _ = environment("0.4.4")
+    folder = BUILD / "lerobot_checkers"
+    if not (folder / "installed").exists():
+        if os.environ.get("MJSENSE_TEST_LEROBOT", "0") == "0":
+            pytest.skip(f"needs {folder}; make it: MJSENSE_TEST_LEROBOT=1 ./dev test -k test_lerobot")
+        run_pip(python, "--no-deps", "--target", folder, "lerobot-doctor==0.2.0", "lerobot-lint==0.1.1", "lerobot-quality-gates==0.1.7",
+                "typer", "click", "shellingham", "annotated-doc", "rich", "markdown-it-py", "mdurl", "pygments")  # fmt: skip
+        (folder / "installed").touch()
+    return python, folder / "bin", {"PYTHONPATH": str(folder), "HF_HUB_OFFLINE": "1", "HF_HOME": str(folder / "hf"), "COLUMNS": "400"}
+
+
 def with_mjsense(version):
     """The Python of LeRobot's environment, and the variables with which it finds mjsense and lerobot_env_mjsense too."""
     if os.environ.get("MJSENSE_TEST_LEROBOT", "0") == "0":

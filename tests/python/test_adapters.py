@@ -5,15 +5,17 @@ The packages and the MuJoCo that they need are in environments of their own: bui
 another robosuite, build/mjlab, build/warp, build/molmospaces, build/mitsuba and build/programs.
 MJSENSE_TEST_ADAPTERS=adapters,libero,mjlab,warp,molmospaces,mitsuba,programs makes them; build/molmospaces uses the torch of
 build/mjlab, because the one that molmo-spaces requires takes several GB.
-MJSENSE_TEST_PROGRAMS is a folder with checkouts of google-deepmind/mujoco, google-deepmind/dm_control, tonyzhaozh/act and
-kevinzakka/mink, whose programs are run.
+MJSENSE_TEST_PROGRAMS is a folder with checkouts of google-deepmind/mujoco, google-deepmind/mujoco_warp, google-deepmind/dm_control,
+tonyzhaozh/act and kevinzakka/mink, whose programs are run, and of mjlab, of a state with tests/test_foot_height_sensor.py.
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -200,6 +202,25 @@ def test_scripts_of_mjlab(environment, tmp_path, monkeypatch):
     assert [*tmp_path.glob("logs/rsl_rl/*/*/model_*.pt")]
 
 
+def test_sensor_tests_of_mjlab(environment, tmp_path):
+    """With the imports renamed, those fail that docs/mjlab.md lists, and no others. Its managers and tasks stay mjlab's own."""
+    names = ("builtin_sensor", "camera_sensor", "contact_sensor", "foot_height_sensor", "raycast_sensor", "sensor_caching")
+    folder = checkout("mjlab/tests/test_foot_height_sensor.py").parent
+    for name in ("conftest", *(f"test_{name}" for name in names)):
+        text = (folder / f"{name}.py").read_text()
+        (tmp_path / f"{name}.py").write_text(re.sub(r"\b(from|import) mjlab\b(?!\.envs|\.tasks)", r"\1 mjsense.compat.mjlab", text))
+    (tmp_path / "fixtures").symlink_to(folder / "fixtures")
+    report = tmp_path / "report.xml"
+    path = Path(mjsense.__file__).parents[1]
+    words = [environment("mjlab"), "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=short", f"--junit-xml={report}", tmp_path]
+    done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(path)})
+    cases = [*ElementTree.parse(report).iter("testcase")]
+    failed = {case.get("name") for case in cases if case.find("failure") is not None or case.find("error") is not None}
+    listed = (ROOT / "docs/mjlab.md").read_text().split("### Tests of mjlab's sensors")[1].split("\n#")[0]
+    assert failed == {*re.findall(r"^\| `(test_\w+)`", listed, re.M)}, done.stdout[-5000:]
+    assert len(cases) - len(failed) > 80
+
+
 @pytest.mark.parametrize("script", ["molmospaces_use", "molmospaces_images"])
 def test_molmospaces(environment, script, tmp_path, monkeypatch):
     monkeypatch.setenv("MLSPACES_ASSETS_DIR", str(tmp_path))
@@ -230,6 +251,11 @@ def test_recorder_of_act(environment):
 def test_notebooks_of_mujoco(environment, name):
     notebook = checkout(f"mujoco/python/{name}.ipynb")
     run(environment("programs"), Path(__file__).parent / "adapters/notebook.py", "mujoco", notebook, "30", notebook.parents[1])
+
+
+def test_notebook_of_mujoco_warp(environment):
+    notebook = checkout("mujoco_warp/notebooks/tutorial.ipynb")
+    run(environment("warp"), Path(__file__).parent / "adapters/notebook.py", "mujoco_warp", notebook, "40")
 
 
 def test_notebook_of_dm_control(environment):

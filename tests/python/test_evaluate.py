@@ -56,6 +56,18 @@ def test_recorded_actions_repeat_the_episodes(planned, tmp_path):
         evaluate("pick", policy=f"replay:{out}", out=tmp_path / "b", episodes=4, **SMALL)
 
 
+def test_videos_that_were_left_out_are_rendered_afterwards(tmp_path):
+    options = {"policy": "random", "episodes": 2, "num_worlds": 2, "horizon": 4, "width": 32, "height": 24, "progress": False}
+    filmed = evaluate("pick", out=tmp_path / "filmed", **options)
+    plain = evaluate("pick", out=tmp_path / "plain", videos=False, **options)
+    assert rows(plain) == rows(filmed) and not list(tmp_path.glob("plain/*/*.mp4"))
+    mjs.render(tmp_path / "plain", tmp_path / "rendered", progress=False)
+    videos = {path.name: path.read_bytes() for path in tmp_path.glob("filmed/*/*.mp4")}
+    assert len(videos) == 4 and {path.name: path.read_bytes() for path in tmp_path.glob("rendered/*/*.mp4")} == videos
+    with pytest.raises(ValueError, match="belongs to a different recording: 'video' was absent and is now"):
+        evaluate("pick", out=tmp_path / "plain", resume=True, **options)
+
+
 class Counting:
     """Moves the first joint by the number of the call and of the action in its chunk."""
 
@@ -102,6 +114,25 @@ def test_chunks_are_executed_as_asked(tmp_path, options, expected):
     assert found[: len(expected)] == [value if value is None else pytest.approx(value, abs=1e-6) for value in expected]
     if "latency" in options:
         assert np.nanmax(latency) == np.float32(0.13)
+
+
+def test_the_same_policy_in_a_loop_of_steps(tmp_path):
+    options, arm = {"execution_horizon": 2, "latency": 0.13}, slice(1, 8)
+    evaluate("pick", policy=Counting(3), out=tmp_path, episodes=[1, 4], num_worlds=2, horizon=7, **options, **SMALL)
+    states = [episode.states for episode in mjs.Dataset(tmp_path).episodes]
+    worlds = mjs.make_vec("pick", num_envs=2, policy=mjs.wrap_policy(Counting(3), **options), episodes=[1, 4], seed=0, horizon=7, autoreset_mode="disabled", cameras=[])
+    worlds.reset()
+    for t in range(1, 8):
+        worlds.step(worlds.expert_action(), done=worlds.expert_done)
+        np.testing.assert_allclose(worlds.sim.state[:, arm], [rows[t, arm] for rows in states], atol=1e-5)  # actions of environments are float32
+    one = mjs.make("pick", policy=mjs.wrap_policy(Counting(3), **options), episodes=[4], seed=0, horizon=7, cameras=[])
+    one.reset()
+    for t in range(1, 8):
+        one.step(one.expert_action())
+        np.testing.assert_allclose(one.sim.state[0, arm], states[1][t, arm], atol=1e-5)
+    assert mjs.wrap_policy("planner") == "planner"
+    with pytest.raises(ValueError, match="policy 'planner' is computed together with its episode"):
+        mjs.wrap_policy("planner", latency=0.1)
 
 
 def test_an_evaluation_is_resumed_after_an_error_of_its_policy(tmp_path):
@@ -226,6 +257,18 @@ def test_a_hostile_benchmark_is_refused(tmp_path, change, message):
     sealed(tmp_path, change)
     with pytest.raises(ValueError, match=message):
         Benchmark(tmp_path)
+
+
+@pytest.mark.parametrize("specs, message", (
+    ([{"scene_dataset": "procthor-10k", "house_index": house} for house in (7, 5, 5)] + [{"scene_dataset": "ithor", "data_split": "test", "house_index": 2}],
+     r"4 episodes in the houses 2 of ithor \(test\); 5, 7 of procthor-10k \(val\)\. mjsense does not contain these scenes"),
+    ([{"scene_dataset": "x" * 1000, "house_index": house} for house in range(99)], "99 episodes in the houses 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, ... of x{60} "),
+    ([3, {"scene_dataset": [], "data_split": {}, "house_index": "0"}], "2 episodes in the houses that it does not state"),
+), ids=("houses", "many", "other"))  # fmt: skip
+def test_a_benchmark_of_molmospaces_is_refused_with_its_scenes(tmp_path, specs, message):
+    (tmp_path / "benchmark.json").write_text(json.dumps(specs))
+    with pytest.raises(ValueError, match=message):
+        evaluate(tmp_path, policy="random", out=tmp_path / "out")
 
 
 def test_files_of_a_benchmark_are_its_own(benchmark, tmp_path):

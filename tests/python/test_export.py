@@ -262,6 +262,45 @@ def test_groot_reads_the_statistics_and_the_columns_that_modality_names(root, tm
         mjs.exporting.export_lerobot21(root, tmp_path / "two", map={"features": {"arm": "obs/agent/qvel/arm"}})
 
 
+def test_groot_n16_reads_windows_of_every_episode(root, tmp_path):
+    """The rules of its loader: an episode's rows are those of `length`, videos are read by row number, a group is a slice of its column and of
+    each statistic, a step is a window of `HORIZON` actions, and stats.json is used as it is if each float feature has six statistics."""
+    horizon = 8
+    out = mjs.exporting.export_lerobot21(root, tmp_path / "v21", map={"features": {"velocity": "obs/agent/qvel"}})
+    info, modality, statistics = (json.loads((out / f"meta/{name}.json").read_text()) for name in ("info", "modality", "stats"))
+    lines = {name: [json.loads(line) for line in (out / f"meta/{name}.jsonl").read_text().splitlines()] for name in ("episodes", "tasks")}
+    sentences = {line["task_index"]: line["task"] for line in lines["tasks"]}
+    every = {}
+    for entry, episode in zip(lines["episodes"], mjs.Dataset(root).episodes, strict=True):
+        number = entry["episode_index"]
+        place = {"episode_chunk": number // info["chunks_size"], "episode_index": number}
+        data = pq.read_table(out / info["data_path"].format(**place)).to_pydict()
+        assert {len(values) for values in data.values()} == {entry["length"]} and entry["length"] >= horizon
+        for about in modality["video"].values():
+            assert about["original_key"] in info["features"]
+            _, _, images = frames(out / info["video_path"].format(video_key=about["original_key"], **place))
+            assert len(images) == entry["length"]
+        ((name, about),) = modality["annotation"].items()
+        assert {sentences[index] for index in data[about.get("original_key", f"annotation.{name}")]} == {episode.task} == set(entry["tasks"])
+        groups = {(kind, group): np.array(data[about["original_key"]], np.float32)[:, about["start"] : about["end"]]
+                  for kind in ("state", "action") for group, about in modality[kind].items()}  # fmt: skip
+        step = entry["length"] - horizon  # the last one with a whole window
+        np.testing.assert_array_equal(groups["action", "arm"][step : step + horizon], episode["actions/joint_pos/arm"][step + 1 : step + horizon + 1].astype(np.float32))
+        np.testing.assert_array_equal(groups["state", "arm"][step], episode["obs/agent/qpos/arm"][step].astype(np.float32))
+        np.testing.assert_array_equal(groups["state", "velocity_arm"][step], episode["obs/agent/qvel/arm"][step].astype(np.float32))
+        for key, values in groups.items():
+            every.setdefault(key, []).append(values)
+    for (kind, group), parts in every.items():
+        about, values = modality[kind][group], np.concatenate(parts)
+        found = {name: np.array(numbers[about["start"] : about["end"]]) for name, numbers in statistics[about["original_key"]].items()}
+        assert {len(numbers) for numbers in found.values()} == {values.shape[1]}, (kind, group)
+        for name, wanted in (("min", values.min(0)), ("max", values.max(0)), ("mean", values.mean(0)), ("std", values.std(0))):
+            np.testing.assert_allclose(found[name], wanted, atol=1e-5, err_msg=f"{kind}.{group} {name}")
+    for name, feature in info["features"].items():
+        if "float" in feature["dtype"]:
+            assert {"mean", "std", "min", "max", "q01", "q99"} <= set(statistics[name]), name
+
+
 @pytest.mark.parametrize(("format", "features", "cameras", "message"), (
     ("lerobot", {"next.done": "rewards"}, {}, "LeRobot's column 'next.done' and the feature 'next.done'"),
     ("lerobot", {"observation.state": "obs/extra/tcp_pose"}, {}, "the feature 'state' and the feature 'observation.state'"),

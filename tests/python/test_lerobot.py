@@ -11,7 +11,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from lerobot_environments import environment
+from lerobot_environments import checkers, environment
 from scenes import ball_scene
 from waiting import MOVES, WAITS, Waiting
 
@@ -131,6 +131,57 @@ def test_lerobot_streams_and_edits_an_export_at_the_default_rate(record, tmp_pat
     out = mjs.exporting.export_lerobot(root, tmp_path / "out", map=map)
     result = read(version, out, tmp_path / "expected.npz", 1, tolerance, mode)
     assert result["rows"] == (rows // 2 if mode == "delete" else rows) and result["wrong"] == 0, result
+
+
+@pytest.fixture(scope="module")
+def placed(tmp_path_factory):
+    """Two episodes of pick_and_place with one small camera; all else is the default."""
+    out = tmp_path_factory.mktemp("placed")
+    mjs.record("pick_and_place", out=out, episodes=2, num_worlds=2, keep_failures=True, width=96, height=64, cameras=["wrist_camera"])
+    return out
+
+
+# What the programs report that docs/export.md explains; everything else is a defect of the export.
+DOCTOR = (
+    r"action\[7\]: [\d.]+% of values at (minimum|maximum) \([\d.]+\)",
+    r"action\[7\]: stuck/static in \d/2 episodes .*",
+    r"action: \d+% of episode \d is consecutive identical actions \(frozen\)",
+    r"\d/2 episode\(s\) flagged",
+    r"Episode \d: \d+% of action frozen \(consecutive identical\)",
+)
+FINGERS = {"DISCONTINUITY", "ACTION_STATE_DIVERGENCE_CRASHED", "ACTION_RANGE_MISMATCH_CRASHED"}
+NOTES = {"UNITS_INFERRED", "TOO_FEW_EPISODES"}
+
+
+def run_checker(name, *words):
+    """What a program prints about a data set. Its exit code says only how severe the findings are."""
+    python, folder, variables = checkers()
+    done = subprocess.run([python, folder / name, *words], capture_output=True, text=True, env={**os.environ, **variables})
+    assert "Traceback" not in done.stderr, done.stderr[-3000:]
+    return done.stdout
+
+
+@pytest.mark.parametrize("format", ("lerobot", "lerobot21"))
+def test_programs_that_check_data_sets_report_what_the_page_explains(placed, tmp_path, format):
+    checkers()
+    out = mjs.export(placed, tmp_path / "out", format=format)
+    report = run_checker("lerobot-doctor", out)
+    findings = re.findall(r"^ +- (.*)$", report, re.M)
+    assert "[FAIL]" not in report and f"Frames: {json.loads((out / 'meta/info.json').read_text())['total_frames']}" in report, report
+    assert [line for line in findings if not any(re.fullmatch(known, line) for known in DOCTOR)] == [], report
+    gates = json.loads(run_checker("lerobot-quality-gates", "check", out, "--format", "json"))
+    assert {finding["path"] for finding in gates["findings"] if "meta/episodes.json" not in finding["message"]} == {"README.md"}, gates
+
+
+@pytest.mark.parametrize("state, explained", (("obs/agent/qpos", NOTES | FINGERS), ("obs/agent/qpos/arm", NOTES)), ids=("all", "arm"))
+def test_lelint_reports_what_the_page_explains(placed, tmp_path, state, explained):
+    checkers()
+    action = state.replace("obs/agent/qpos", "actions/joint_pos")
+    out = mjs.export(placed, tmp_path / "out", format="lerobot", map={"state": state, "action": action})
+    run_checker("lelint", "check", out, "--json", tmp_path / "report.json")
+    found = json.loads((tmp_path / "report.json").read_text())["findings"]
+    assert {finding["check"] for finding in found} <= explained, found
+    assert {finding["joint"] for finding in found if finding["check"] == "DISCONTINUITY"} <= {"7", "8"}, found
 
 
 TRAIN = """--policy.type=act --policy.device=cpu --policy.push_to_hub=false --policy.pretrained_backbone_weights=null --policy.dim_model=64

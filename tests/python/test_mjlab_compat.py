@@ -11,6 +11,7 @@ from wheels import wheel
 
 from mjsense.compat.mjlab import sensor as ml
 from mjsense.compat.mjlab._tensors import HAS_TORCH
+from mjsense.compat.mjlab._tensors import tensor as ml_tensor
 from mjsense.compat.mjlab.entity import EntityCfg
 from mjsense.compat.mjlab.scene import Scene, SceneCfg
 from mjsense.compat.mjlab.sim import Simulation, SimulationCfg
@@ -267,3 +268,92 @@ def test_tensors_share_memory():
     assert scene["box/place"].data is place and place[:, 0].tolist() == [1, 2]
     sim.reset(torch.tensor([0]))
     assert scene["box/place"].data[:, 0].tolist() == [0, 2]
+
+
+ARM = """<mujoco><worldbody><body name="base" pos="0 0 1"><freejoint name="root"/><geom size=".1 .2 .05" type="box" pos=".03 0 .01"/>
+<body name="link" pos=".2 0 0"><joint name="hinge" axis="0 1 0"/><joint name="slide" type="slide" axis="1 0 0"/>
+<geom type="capsule" size=".02" fromto="0 0 0 .3 0 0"/></body></body></worldbody>
+<actuator><motor name="motor" joint="hinge"/></actuator></mujoco>"""
+
+
+def two_entities():
+    """A scene with an arm that comes after another entity, so that its places in qpos and qvel are not the first ones."""
+    from_string = mujoco.MjSpec.from_string
+    scene = Scene(SceneCfg(num_envs=WORLDS, entities={name: EntityCfg(spec_fn=lambda: from_string(ARM)) for name in ("first", "arm")}))
+    return scene, Simulation(WORLDS, SimulationCfg(), scene.compile())
+
+
+def like_tensor(values):
+    return ml_tensor(np.ascontiguousarray(values, np.float32))
+
+
+def test_entities_are_written_and_read_as_in_mjlab():
+    """The state, in the frames that mjlab defines, against mj_objectVelocity of plain MuJoCo."""
+    scene, sim = two_entities()
+    arm, rng = scene["arm"], np.random.default_rng(0)
+    before = array(sim.data.qpos).copy()
+    state = rng.normal(size=(2, 13))
+    state[:, 3:7] /= np.linalg.norm(state[:, 3:7], axis=1)[:, None]
+    joints, speeds = rng.uniform(-1, 1, (2, 2)), rng.uniform(-1, 1, (2, 2))
+    worlds = [0, 2]
+    model, plain = sim.mj_model, mujoco.MjData(sim.mj_model)
+    body, found = model.body("arm/base").id, np.zeros(6)
+
+    def velocity(world, kind, local):
+        plain.qpos[:], plain.qvel[:] = array(sim.data.qpos)[world], array(sim.data.qvel)[world]
+        mujoco.mj_forward(model, plain)
+        mujoco.mj_objectVelocity(model, plain, kind, body, found, local)
+        return np.concatenate([found[3:], found[:3]])
+
+    origin, mass = mujoco.mjtObj.mjOBJ_XBODY, mujoco.mjtObj.mjOBJ_BODY
+    arm.write_root_state_to_sim(like_tensor(state), like_tensor(worlds).long() if HAS_TORCH else np.array(worlds))
+    arm.write_joint_state_to_sim(like_tensor(joints), like_tensor(speeds), env_ids=worlds)
+    arm.write_ctrl_to_sim(like_tensor([[0.5]]), env_ids=[1])
+    sim.forward()
+    np.testing.assert_array_equal(array(sim.data.ctrl), [[0, 0], [0, 0.5], [0, 0]])
+    np.testing.assert_array_equal(array(sim.data.qpos)[1], before[1])
+    np.testing.assert_array_equal(array(sim.data.qpos)[:, :9], before[:, :9])  # the other entity
+    np.testing.assert_allclose(array(arm.data.root_link_pose_w)[worlds], state[:, :7], atol=1e-6)
+    np.testing.assert_allclose(array(arm.data.root_link_vel_w)[worlds], state[:, 7:], atol=1e-6)
+    np.testing.assert_allclose(array(arm.data.joint_pos)[worlds], joints, atol=1e-6)
+    np.testing.assert_allclose(array(arm.data.joint_vel)[worlds], speeds, atol=1e-6)
+    for world, wanted in zip(worlds, state[:, 7:], strict=True):
+        np.testing.assert_allclose(velocity(world, origin, 0), wanted, atol=1e-6)
+        in_body = np.concatenate([array(v)[world] for v in (arm.data.root_link_lin_vel_b, arm.data.root_link_ang_vel_b)])
+        np.testing.assert_allclose(in_body, velocity(world, origin, 1), atol=1e-6)
+        down = plain.xmat[body].reshape(3, 3).T @ [0, 0, -1]
+        np.testing.assert_allclose(array(arm.data.projected_gravity_b)[world], down, atol=1e-9)
+        np.testing.assert_allclose(array(arm.data.body_link_pos_w)[world, 1], plain.body("arm/link").xpos, atol=1e-9)
+    given = rng.normal(size=(WORLDS, 6))
+    arm.write_root_com_velocity_to_sim(like_tensor(given))
+    for world in range(WORLDS):
+        np.testing.assert_allclose(velocity(world, mass, 0), given[world], atol=1e-6)
+    arm.write_root_link_velocity_b_to_sim(like_tensor(given))
+    np.testing.assert_allclose(velocity(1, origin, 1), given[1], atol=1e-6)
+    with pytest.raises(ValueError, match="root_state has 7 columns, not 13"):
+        arm.write_root_state_to_sim(like_tensor(state[:, :7]))
+    with pytest.raises(ValueError, match="entity 'arm': 3 numbers of qpos for each world, and it has 2"):
+        arm.write_joint_position_to_sim(like_tensor(np.zeros((WORLDS, 3))))
+    with pytest.raises(AttributeError, match=r"Entity\.data of mjsense\.compat\.mjlab has no 'heading_w'"):
+        _ = arm.data.heading_w
+
+
+def test_expanded_fields_of_the_model_are_applied_by_forward():
+    _, sim = two_entities()
+    mass = sim.mj_model.body_mass.copy()
+    sim.expand_model_fields(("body_mass",))
+    sim.model.body_mass[1] *= 2
+    sim.forward()
+    np.testing.assert_array_equal(sim.native.model_field("body_mass"), [mass, 2 * mass, mass])
+    assert sim.model.nbody == len(mass)
+
+
+@pytest.mark.parametrize(("kind", "obj", "text"), (
+    ("gyro", None, "requires obj with type='site'"), ("gyro", "body", "requires obj.type='site', not 'body'"),
+    ("jointpos", "site", "requires obj.type='joint', not 'site'"), ("framepos", "joint", "requires obj.type=one of"),
+))  # fmt: skip
+def test_built_in_sensors_are_checked_when_they_are_written(kind, obj, text):
+    with pytest.raises(ValueError, match=f"sensor 's': the type '{kind}' {text}"):
+        ml.BuiltinSensorCfg("s", kind, None if obj is None else ml.ObjRef(obj, "name"))
+    with pytest.raises(ValueError, match="'subtreecom' does not support ref specification"):
+        ml.BuiltinSensorCfg("s", "subtreecom", ml.ObjRef("body", "a"), ml.ObjRef("body", "b"))

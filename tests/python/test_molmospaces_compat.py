@@ -11,7 +11,7 @@ import mjsense as mjs
 from mjsense.compat import molmospaces
 from mjsense.compat.molmospaces.env.abstract_sensors import SensorSuite
 from mjsense.compat.molmospaces.env.sensors import GraspStateSensor, ObjectStartPoseSensor, get_core_sensors
-from mjsense.compat.molmospaces.policy.base_policy import PlannerPolicy
+from mjsense.compat.molmospaces.policy.base_policy import InferencePolicy, PlannerPolicy, StatefulPolicy
 from mjsense.compat.molmospaces.tasks.task import BaseMujocoTask
 from mjsense.compat.molmospaces.utils.save_utils import byte_array_to_dict, dict_to_byte_array, is_camera_sensor
 
@@ -142,6 +142,82 @@ def test_policy_written_for_one_world_runs_in_many(tmp_path):
         assert trajectory["obs/extra/policy_phase"][:].ravel().tolist() == [3, 3, 3, 5, 5, 5, 5]
         assert json.loads(trajectory["obs_scene"][()])["policy_phases"] == {"open": 3, "close": 5}
         assert len(trajectory["success"]) == 7
+
+
+class Foreign:
+    """The methods of an InferencePolicy of molmo_spaces 0.2.9, whose model answers with chunks of two actions."""
+
+    def __init__(self, speed=0.02):
+        self.speed, self.task = speed, None
+
+    def reset(self):
+        self.buffer, self.prompt = [], None
+
+    def obs_to_model_input(self, obs):
+        self.prompt = self.prompt or self.task.get_task_description()
+        assert self.prompt == self.task.get_task_description() and self.task.config.task_type == "pick"
+        return {"joints": obs["qpos"]["arm"], "step": self.task.episode_step_count}
+
+    def inference_model(self, model_input):
+        if not self.buffer:
+            self.buffer = [model_input["joints"] + k * self.speed * model_input["step"] for k in (1, 2)]
+        return self.buffer.pop(0)
+
+    def model_output_to_action(self, model_output):
+        return {"arm": model_output, "gripper": np.array([0.0])}
+
+    def get_action(self, observation):
+        return self.model_output_to_action(self.inference_model(self.obs_to_model_input(observation)))
+
+    def create_policy_sensors(self):
+        return []
+
+
+class Stateful(Foreign):
+    def get_state(self):
+        return list(self.buffer), self.prompt
+
+    def set_state(self, state):
+        self.buffer, self.prompt = list(state[0]), state[1]
+
+
+class Own(Stateful, InferencePolicy, StatefulPolicy):
+    """The same with mjsense's classes."""
+
+    def __init__(self):
+        InferencePolicy.__init__(self, "configuration")
+        self.speed = 0.02
+
+    def get_action(self, observation):
+        return InferencePolicy.get_action(self, observation) or {}
+
+
+@pytest.mark.parametrize(("policy", "worlds"), ((f"python:{__name__}:Foreign", 2), (Stateful(), 3), (Own, 3)), ids=("copied", "shared", "own"))
+def test_a_policy_with_a_model_plays_the_same_in_any_number_of_worlds(tmp_path, played, policy, worlds):
+    results = mjs.evaluate("pick", policy=policy, out=tmp_path, num_worlds=worlds, **INFERRED)
+    assert [one.number for one in results.dataset.episodes] == [0, 1, 2]
+    for mine, other in zip(results.dataset.episodes, played, strict=True):
+        np.testing.assert_array_equal(mine.states, other)
+
+
+INFERRED = {"episodes": 3, "horizon": 6, "cameras": [], "progress": False}
+
+
+@pytest.fixture(scope="module")
+def played(tmp_path_factory):
+    """States of these episodes, computed in a loop of one world."""
+    env = mjs.make_vec("pick", seed=0, horizon=6, cameras=[])
+    states = []
+    for number in range(3):
+        observation, _ = env.reset(options={"episodes": [number]})
+        rows, buffer = [env.sim.state[0].copy()], []
+        for step in range(6):
+            if not buffer:
+                buffer = [observation["qpos"]["arm"][0] + k * 0.02 * step for k in (1, 2)]
+            observation, *_ = env.step(np.concatenate([buffer.pop(0), [0.0]])[None])
+            rows.append(env.sim.state[0].copy())
+        states.append(rows)
+    return states
 
 
 def test_rows_of_text():

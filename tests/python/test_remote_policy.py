@@ -31,6 +31,7 @@ import mjsense as mjs
 from mjsense.evaluation import PolicyServer, RemotePolicy, evaluate
 from mjsense.evaluation.policies import RandomPolicy
 from mjsense.evaluation.remote import adapter, adapters, client, messages, server
+from mjsense.evaluation.remote.served_adapter import ServedAdapter
 from mjsense.exporting.mapping import Source
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -209,6 +210,29 @@ def test_the_adapter_of_a_file(tmp_path, rows):
     np.testing.assert_array_equal(message["q"], [-1, 0.5])
     assert message["image"].shape == (3, 36, 64) and message["q"].dtype == np.float64 and made.arrays == "msgpack_numpy" and "prompt" not in message
     assert list(made.commands({"arm": np.zeros(7), "gripper": np.zeros(1)}, GROUPS)) == ["arm"]
+
+
+def test_an_adapter_of_a_server_is_that_of_a_client_backwards(tmp_path, rows):
+    (tmp_path / "a.toml").write_text(
+        '[observation.image]\nstreams = "wrist_camera"\nlayout = "chw"\n[observation.q]\nstreams = ["qpos/gripper", "qpos/arm"]\n'
+        "columns = [8, 7, 6, 5, 4, 3, 2, 1, 0]\nfrom = [0, 255]\nto = [1, -1]\n"
+        '[actions.gripper]\ncolumns = [0]\nfrom = [0, 1]\nto = [255, 0]\n[actions.arm]\nkey = "arm"\n'
+    )
+    specs, commands = {name: spec for name, (_, spec, _) in STREAMS.items()}, np.random.default_rng(0).uniform(0, 3, (2, 8))
+    for name, observed in ((str(tmp_path / "a.toml"), None), ("features", None), ("droid", ["qpos/arm"])):
+        made = check(adapters.adapter_of(name, STREAMS, GROUPS))
+        served = ServedAdapter(made, specs, GROUPS, observed)
+        for stream, row in served.rows(made.message(rows, 1, "")).items():
+            np.testing.assert_allclose(row, rows[stream][1], atol=1e-3)
+        for group, found in made.commands(served.answer(commands), GROUPS).items():
+            expected = commands[:, GROUPS[group]]
+            np.testing.assert_allclose(found, np.where(expected > 127.5, 255, 0) if (name, group) == ("droid", "gripper") else expected, atol=1e-9)
+    for observed, message in ((["qpos/gripper"], "'observation/gripper_position' does not have all numbers of qpos/gripper"), (["tcp_pos"], "it has no 'tcp_pos', which the policy observes")):
+        with pytest.raises(ValueError, match=message):
+            ServedAdapter(made, specs, GROUPS, observed)
+    (tmp_path / "b.toml").write_text('[observation.q]\nstreams = "qpos/arm"\n[actions.arm]\n')
+    with pytest.raises(ValueError, match="no key for the commands of the move group 'gripper'"):
+        ServedAdapter(adapters.adapter_of(str(tmp_path / "b.toml"), STREAMS, GROUPS), specs, GROUPS, None)
 
 
 @pytest.mark.parametrize("change, message", [
@@ -478,6 +502,44 @@ def test_limits_of_the_server(monkeypatch):
             PolicyServer(Joints, port=served.port)
 
 
+@pytest.fixture(scope="module")
+def certificate(tmp_path_factory):
+    """A certificate of 127.0.0.1 that signs itself, and its private key."""
+    folder = tmp_path_factory.mktemp("certificate")
+    made = [str(folder / "certificate.pem"), str(folder / "private.pem")]
+    words = ["-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-subj", "/CN=mjsense", "-addext", "subjectAltName=IP:127.0.0.1"]
+    subprocess.run(["openssl", "req", "-x509", *words, "-out", made[0], "-keyout", made[1]], check=True, capture_output=True)
+    return made
+
+
+def test_a_key_and_encryption(certificate, tmp_path):
+    right, wrong = tmp_path / "right", tmp_path / "wrong"
+    right.write_text("0123456789abcdef\n")
+    wrong.write_text("0123456789abcdeg")
+    access = {"key_file": str(right), "certificate": certificate[0]}
+    with PolicyServer(Joints(), port=0, private_key=certificate[1], **access) as server:
+        assert server.url.startswith("wss://127.0.0.1:")
+        made = RemotePolicy(server.url, **access)
+        assert made.name == "joints" and "0123456789abcdef" not in made.fingerprint()
+        for options, message in (
+            ({**access, "key_file": ""}, "needs a key: the option key_file"),
+            ({**access, "key_file": str(wrong)}, "needs another key: the option key_file"),
+            ({**access, "certificate": ""}, "its certificate is not trusted: self.signed certificate; the option certificate names"),
+        ):
+            with pytest.raises(ConnectionError, match=message):
+                RemotePolicy(server.url, patience=0.1, **options)
+    wrong.write_text("short")
+    for options, message in (
+        ({"key_file": str(wrong)}, "key_file '.*wrong': it must contain one key: 16 to 512 visible ASCII characters"),
+        ({"certificate": certificate[0]}, "wss:// needs both certificate and private_key; private_key is missing"),
+        ({"certificate": str(wrong), "private_key": str(wrong)}, "expected PEM files"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            PolicyServer(Joints(), port=0, **options)
+    with pytest.raises(ValueError, match="a certificate belongs to wss://HOST:PORT"):
+        RemotePolicy("ws://127.0.0.1:1", certificate=certificate[0])
+
+
 def ask_metadata(url):
     with connect(url) as link:
         return link.recv()
@@ -518,6 +580,12 @@ def test_policies_of_mjsense_are_served(tmp_path):
         for _ in range(2):
             expected, found = local.act({}), remote.act({})
             np.testing.assert_array_equal(np.concatenate([found["arm"][:, 0], found["gripper"][:, 0]], -1), expected)
+    with PolicyServer(Grouped, task="pick", adapter="features", task_options={"cameras": []}, port=0) as served:
+        assert {"adapter": "features"}.items() <= RemotePolicy(served.url)._server.items()
+        found = messages.unpack(ask(served.url, {"observation.state": np.arange(9) / 10})).value["action"]
+        np.testing.assert_allclose(found, [[*np.arange(7) / 10, 0.8]] * 2, atol=1e-6)
+        assert "'observation.state' is int64 (8,): must be (9,)" in ask(served.url, {"observation.state": np.arange(8)})
+        assert "the observation has no 'observation.state'" in ask(served.url, question)
     with PolicyServer(Peeking, task="pick", port=0) as served:
         assert "reads sim.time, and a served policy has observations only" in ask(served.url, question)
     with PolicyServer(Grouped, task="pick", task_options={"width": 32, "height": 24}, port=0) as served:

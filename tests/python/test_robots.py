@@ -10,6 +10,7 @@ import h5py
 import mujoco
 import numpy as np
 import pytest
+from world_model import model_of
 
 import mjsense as mjs
 
@@ -138,10 +139,24 @@ def test_an_episode_with_a_deep_contact_is_no_success(tmp_path):
     assert mjs.record("pick", "franka", out=tmp_path / "any", max_penetration=0, **options).succeeded == 3
 
 
+def test_discs_that_are_wider_than_the_hand_are_not_targets():
+    """A YAM opens its fingers by 75 mm. A lying disc of 78 mm is flat enough, but would need a finger below it."""
+    with contextlib.closing(mjs.make_vec("pick_and_place", "i2rt_yam", num_envs=24, policy=None, cameras=[])) as env:
+        env.reset(seed=0)
+        widths = [[], []]
+        for world in range(24):
+            model = model_of(env.sim, world)
+            target = json.loads(env._rollout.obs_scene(world))["objects"]["pickup_obj"]["body"]
+            disc = model.body("yellow_puck/yellow_puck")
+            widths[target == disc.name].append(2000 * model.geom_size[disc.geomadr[0], 0])
+    other, chosen = widths
+    assert max(other) > 71 and chosen and max(chosen) < 71, widths
+
+
 @pytest.mark.parametrize(
     ("task", "robot", "system", "outer", "wrist", "few"),
     [("pick", "rby1", "", "camera_follower", "", 2), ("pick", "i2rt_yam", "", "exo_camera_1", "wrist_camera", 0),
-     ("pick", "franka", "gopro_d405_d455", "exo_camera_1", "wrist_camera", 0)],
+     ("pick", "franka", "gopro_d405_d455", "exo_camera_1", "wrist_camera", 0), ("pick", "franka", "", "exo_camera_1", "wrist_camera", 0)],
 )  # fmt: skip
 def test_cameras_show_the_target_at_the_start(task, robot, system, outer, wrist, few):
     """A disc of the area of the target is at least 20 pixels wide at 640x480 in one outer camera, except in a few episodes in which a

@@ -37,6 +37,7 @@ _NOT_FIXED = (
     "shard",
     "keep_failures",
     "replay",
+    "videos",
     "terminate_upon_success",
     "worlds",
 )

@@ -85,9 +85,9 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument(
         "--vary",
         metavar="NAMES",
-        help="Evaluate on the same episodes again with each of these factors, one at a time: light, camera, "
-        "texture, distractors, instruction, "
-        "start, latency=SECONDS; separated by commas.",
+        help="Evaluate on the same episodes again with each of these factors, one at a time: light, camera, texture, "
+        "distractors, instruction, start, latency=SECONDS; separated by commas. light=0.5 changes half as much, "
+        "distractors=5 is the number of objects.",
     )
     parser.add_argument(
         "--no-terminate-upon-success",

@@ -26,7 +26,7 @@ def add_arguments(parser: Parser) -> None:
         "--task",
         default="",
         metavar="TEXT",
-        help="Task whose streams and robot the policy knows. Only a mjsense.Policy needs it.",
+        help="Task whose streams and robot the policy knows. Only a mjsense.Policy and --adapter need it.",
     )
     complete(action, NAMES["tasks"])
     complete(
@@ -35,6 +35,13 @@ def add_arguments(parser: Parser) -> None:
     parser.add_argument("--camera-system", metavar="TEXT", help="Camera system of the task, as in mjsense record.")
     parser.add_argument("--size", metavar="WxH", help="Width and height of the images.")
     parser.add_argument("--arm-controller", metavar="TEXT", help="Controller of the robot's arms, as in mjsense record.")
+    action = parser.add_argument(
+        "--adapter",
+        default="",
+        metavar="TEXT",
+        help="Names and conventions of the clients' messages: droid, features, or a TOML file. By default the streams' own.",
+    )
+    complete(action, ("droid", "features"))
     parser.add_argument(
         "--host",
         default="127.0.0.1",
@@ -44,6 +51,14 @@ def add_arguments(parser: Parser) -> None:
     )
     parser.add_argument("--port", type=int, default=8000, help="Port; by default 8000; 0: any free one.")
     parser.add_argument("--connections", type=int, default=64, metavar="N", help="Maximum number of connections; by default 64.")
+    parser.add_argument("--key-file", default="", metavar="FILE", help="File with a key that clients must have; by default none.")
+    for name, what in (("certificate", "certificate"), ("private-key", "private key")):
+        parser.add_argument(
+            f"--{name}",
+            default="",
+            metavar="FILE",
+            help=f"PEM file with the {what} of wss://; by default there is no encryption.",
+        )
     parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
 
 
@@ -57,7 +72,10 @@ def run(arguments: argparse.Namespace) -> int:
     task = {name: getattr(arguments, name) for name in names if getattr(arguments, name) is not None}
     if arguments.size is not None:
         task |= read_size(FIELDS["ImageCfg"], arguments.size)
-    place = {name: getattr(arguments, name) for name in ("task", "host", "port", "connections")}
+    place = {
+        name: getattr(arguments, name)
+        for name in ("task", "adapter", "host", "port", "connections", "key_file", "certificate", "private_key")
+    }
     with PolicyServer(
         arguments.policy, task_options=task, policy_options=policy_options(arguments.policy_options), log=tell, **place
     ) as server:

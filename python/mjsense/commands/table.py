@@ -78,6 +78,7 @@ FIELDS = {
         Field('shard', 'shard', 'shard', 'text', 'k/n, k from 0: play only part k of n of the attempts, in the directory shard_k of the output directory; requires num_attempts, the number of attempts of all shards.'),
         Field('keep_failures', 'keep_failures', 'keep_failures', 'bool', 'Keep failed episodes too.'),
         Field('replay', 'replay', 'replay', 'bool', "Do not store what replay needs: the model, and the simulation's state and controls of every step.", is_on=True),
+        Field('videos', 'videos', 'videos', 'bool', 'Do not store the images of the cameras as videos. Without them, mjsense render makes the videos of chosen episodes afterwards.', is_on=True),
     ],
     "RolloutCfg": [
         Field('task', 'task', 'task', 'text', 'Name of the task.', default='pick'),

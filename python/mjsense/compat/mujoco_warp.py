@@ -15,6 +15,7 @@ own everywhere, and read these arrays.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import dataclasses
 import functools
 import importlib.metadata
@@ -46,6 +47,7 @@ _CALLS = {"step": 0, "forward": 1, "step1": 2, "step2": 3}
 _RESET = 4
 _OWN = {name: getattr(mujoco_warp, name) for name in (*_CALLS, "reset_data", "ray", "rays", "refit_bvh", "put_model")}
 """mujoco_warp's own functions."""
+_capture_launch = wp.capture_launch
 
 _OTHER = ("qLD", "qLDiagInv", "qLU", "qH", "qHDiagInv")
 """Fields that have the names of fields of MuJoCo, with different contents."""
@@ -94,12 +96,12 @@ def use(threads: int = 0) -> None:
             f"mjsense.compat.mujoco_warp is tested with mujoco-warp {' to '.join(_TESTED)}, and {version} is installed"
         )
     _threads = threads
-    _replace({_OWN[name]: new for name, new in _NEW.items()})
+    _replace({_OWN[name]: new for name, new in _NEW.items()} | {_capture_launch: _launch_graph})
 
 
 def stop() -> None:
     """From now on, all functions are mujoco_warp's own again."""
-    _replace({new: _OWN[name] for name, new in _NEW.items()})
+    _replace({new: _OWN[name] for name, new in _NEW.items()} | {_launch_graph: _capture_launch})
 
 
 @contextlib.contextmanager
@@ -307,11 +309,57 @@ def _call(name: str) -> Callable[[Any, Any], None]:
     @functools.wraps(own)
     def call(m: Any, d: Any) -> None:
         if _on_cpu(m, d):
-            worlds_of(m, d).run(number)
+            _do(lambda: worlds_of(m, d).run(number))
         else:
             own(m, d)
 
     return call
+
+
+# Graphs. Warp records kernels while a graph is captured on the CPU, and runs them when it is launched. A kernel that calls a
+# function of this process has its place among them.
+
+
+@wp.func_native("((void (*)(long long))function)(argument);")
+def _call_back(function: wp.int64, argument: wp.int64) -> None: ...
+
+
+@wp.kernel(enable_backward=False, module="unique")
+def _recorded(function: wp.int64, argument: wp.int64) -> None:
+    _call_back(function, argument)
+
+
+_in_graphs: dict[int, Callable[[], None]] = {}
+"""Calls that graphs contain, by their number."""
+_failed: list[BaseException] = []
+"""Errors of calls in the graph that is being launched."""
+
+
+@ctypes.CFUNCTYPE(None, ctypes.c_longlong)
+def _run_recorded(number: int) -> None:
+    if not _failed:  # the graph cannot be stopped
+        try:
+            _in_graphs[number]()
+        except BaseException as error:
+            _failed.append(error)
+
+
+def _do(call: Callable[[], None]) -> None:
+    """Calls this now, or, while a graph is captured, whenever the graph is launched."""
+    device: Any = wp.get_device("cpu")
+    if not device.is_capturing:
+        return call()
+    number = id(call)
+    _in_graphs[number] = call
+    weakref.finalize(wp._src.context.runtime._apic_graph, _in_graphs.pop, number, None)
+    wp.launch(_recorded, dim=1, inputs=[ctypes.cast(_run_recorded, ctypes.c_void_p).value, number], device="cpu")
+
+
+@functools.wraps(_capture_launch)
+def _launch_graph(graph: Any, stream: Any = None) -> None:
+    _capture_launch(graph, stream)
+    if _failed:
+        raise _failed.pop()
 
 
 @functools.wraps(_OWN["reset_data"])
@@ -319,14 +367,18 @@ def _reset_data(m: Any, d: Any, reset: Any = None) -> None:
     if not _on_cpu(m, d):
         return _OWN["reset_data"](m, d, reset)
     if reset is None:
-        return worlds_of(m, d).run(_RESET)
+        return _do(lambda: worlds_of(m, d).run(_RESET))
     if reset.shape != (d.nworld,) or not (reset.dtype is wp.bool or wp.types.type_is_int(reset.dtype)) or not reset.device.is_cpu:
         raise ValueError(
             f"reset_data(): reset must be an array of {d.nworld} bools or integers on the CPU, "
             f"not {reset.dtype.__name__} {reset.shape} on {reset.device}"
         )
-    mask = np.ascontiguousarray(reset.numpy() != 0)
-    return worlds_of(m, d).run(_RESET, mask.ctypes.data)
+
+    def run() -> None:
+        mask = np.ascontiguousarray(reset.numpy() != 0)
+        worlds_of(m, d).run(_RESET, mask.ctypes.data)
+
+    return _do(run)
 
 
 def _casts(model: Any, data: Any) -> bool:
@@ -344,7 +396,7 @@ def _rays(*args: Any, **kwargs: Any) -> None:
     query.apply_defaults()
     model, data = query.arguments["m"], query.arguments["d"]
     if _casts(model, data):
-        _worlds[id(data)].cast(query.arguments)
+        _do(lambda: _worlds[id(data)].cast(dict(query.arguments)))
     else:
         _OWN["rays"](*args, **kwargs)
 

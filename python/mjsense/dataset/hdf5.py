@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import threading
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -38,9 +39,33 @@ def text_of(value: Any) -> str:
     return bytes(value).split(b"\0", 1)[0].decode(errors="replace")
 
 
+class _Kept(threading.local):
+    """The file that this thread keeps open."""
+
+    path: Path | None = None
+    root: Group | None = None
+
+
+_kept = _Kept()
+
+
+@contextlib.contextmanager
+def kept_open(path: Path) -> Iterator[None]:
+    """Inside of the block, this thread opens the file once for all calls of :func:`open_h5`. Blocks cannot be nested."""
+    with open_h5(path) as _kept.root:
+        _kept.path = path
+        try:
+            yield
+        finally:
+            _kept.path = _kept.root = None
+
+
 @contextlib.contextmanager
 def open_h5(path: Path) -> Iterator[Group]:
     """The root group of a file, which is open inside of the block."""
+    if _kept.root is not None and _kept.path == path:
+        yield _kept.root
+        return
     h5py = optional("h5py", "dataset", "Reading recordings")
     with open_plain(path) as plain:
         try:

@@ -16,6 +16,7 @@ from mjsense.core.declared_fields import declared_fields
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.core.rotations import quaternions_of
 from mjsense.dataset.description import is_known_thing, printable
+from mjsense.dataset.episode_rows import VIDEOS
 from mjsense.dataset.hdf5 import open_h5
 from mjsense.dataset.playback import where
 from mjsense.sensors.configs import CameraSensorCfg
@@ -258,7 +259,7 @@ def choose(
     depth: bool | None,
     segmentation: bool | None,
 ) -> tuple[list[RenderCamera], CameraSystem | None, list[RenderCamera]]:
-    """The cameras in the order of the new recording, the camera system, and those cameras that are as recorded."""
+    """The cameras in the order of the new recording, the camera system, and those cameras whose videos are as recorded."""
     system = CameraSystem(camera_system, episode) if camera_system else None
     if cameras is None and system is not None:
         cameras = []
@@ -278,4 +279,5 @@ def choose(
     twice = {name for name in names if names.count(name) > 1}
     if twice:
         raise ValueError(f"two cameras are named '{sorted(twice)[0]}'; a camera that is added needs a new name")
-    return chosen, system, [camera for camera, before in zip(chosen, recorded) if camera == before]
+    unchanged = [camera for camera, before in zip(chosen, recorded) if camera == before]
+    return chosen, system, [camera for camera in unchanged if VIDEOS + camera.name in episode.streams]

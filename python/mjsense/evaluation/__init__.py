@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from mjsense.evaluation.report import Results as Results
     from mjsense.evaluation.report import results as results
     from mjsense.evaluation.timing import Timed as Timed
+    from mjsense.evaluation.timing import wrap_policy as wrap_policy
     from mjsense.evaluation.varied import Sensitivity as Sensitivity
     from mjsense.evaluation.varied import sensitivity as sensitivity
 
@@ -38,6 +39,7 @@ _PLACES: dict[str, str] = {
     "policy_from": "policies",
     "results": "report",
     "sensitivity": "varied",
+    "wrap_policy": "timing",
 }
 """Module of each public name."""
 __all__ = [
@@ -55,6 +57,7 @@ __all__ = [
     "policy_from",
     "results",
     "sensitivity",
+    "wrap_policy",
 ]
 
 

@@ -15,14 +15,14 @@ import inspect
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mjsense import _core
-from mjsense.core.errors import UnknownNameError, did_you_mean
+from mjsense.core.errors import UnknownNameError, did_you_mean, printable
 from mjsense.dataset import Dataset, Episode, bounded_json
 from mjsense.dataset.places import is_plain_name
 from mjsense.tasks.recording import record
@@ -31,6 +31,7 @@ from mjsense.tasks.vector import TaskVectorEnv, make_vec
 FILE, STARTS = "benchmark.json", "starts"
 PREFIX, _SHIPPED = "benchmark:", Path(__file__).parent / "shipped"
 _FORMAT = 1
+_SHOWN = 10  # houses in a message
 _FILE_BYTES = 1 << 24
 _MAX_EPISODES, _MAX_FILES, _MAX_DEPTH = 100_000, 1_000_000, 4
 _PARTS = ("task", "robot", "scene", "split", "arm_controller", "camera_system")
@@ -77,7 +78,11 @@ class Benchmark:
             raise FileNotFoundError(f"benchmark: '{self.folder}' has no {FILE}")
         with open(path, "rb") as file:
             text = file.read(_FILE_BYTES + 1)
-        table = bounded_json.parse_object(text, str(path), _FILE_BYTES)
+        table = bounded_json.parse(text, str(path), _FILE_BYTES)
+        if isinstance(table, list):
+            raise ValueError(f"{path} is a benchmark of MolmoSpaces, {_houses_of(table)}. mjsense does not contain these scenes")
+        if not isinstance(table, dict):
+            raise ValueError(f"{path} is {bounded_json.kind_of(table)}, not an object")
         if table.get("format") != _FORMAT:
             raise ValueError(f"{path}: format is {table.get('format')!r}; this version of mjsense reads {_FORMAT}")
         self.checksum = _checksum(table)
@@ -138,6 +143,23 @@ class Benchmark:
                     )
         finally:
             env.close()
+
+
+def _houses_of(episodes: list[Any]) -> str:
+    """The scenes of MolmoSpaces' episodes: ``3 episodes in the houses 1, 5 of procthor-10k (val)``."""
+    houses: dict[str, set[int]] = {}
+    for episode in episodes:
+        about = episode if isinstance(episode, dict) else {}
+        name, split, house = about.get("scene_dataset"), about.get("data_split", "val"), about.get("house_index")
+        if isinstance(name, str) and isinstance(split, str) and type(house) is int:
+            houses.setdefault(printable(f"{name:.60} ({split:.20})"), set()).add(house)
+    texts = [f"{_first(map(str, sorted(numbers)), ', ')} of {name}" for name, numbers in sorted(houses.items())]
+    return f"{len(episodes)} episodes in the houses {_first(texts, '; ') or 'that it does not state'}"
+
+
+def _first(texts: Iterable[str], comma: str) -> str:
+    listed = list(texts)
+    return comma.join([*listed[:_SHOWN], *["..."] * (len(listed) > _SHOWN)])
 
 
 _DEFAULTS: dict[str, Any] = {

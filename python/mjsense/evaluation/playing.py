@@ -18,7 +18,7 @@ from mjsense.evaluation.facts import FILE
 from mjsense.evaluation.policies import policy_from
 from mjsense.evaluation.replayed import ReplayedPolicy
 from mjsense.evaluation.report import Results, require_parquet, results
-from mjsense.evaluation.timing import Latency, Timed
+from mjsense.evaluation.timing import Latency, timed
 from mjsense.tasks.code_checksums import checksums
 from mjsense.tasks.parts import Robots, Scenes, Tasks
 from mjsense.tasks.policy import Policy
@@ -86,6 +86,7 @@ def evaluate(
     keyint: int = 20,
     molmospaces_depth: bool = False,
     replay: bool = True,
+    videos: bool = True,
     # end of options
     sensors: Iterable[Any] = (),
     ray: str | None = None,
@@ -182,6 +183,8 @@ def evaluate(
             makes files smaller.
         molmospaces_depth: Add depth in the form that MolmoSpaces' loaders read: a lossy red-green video.
         replay: Store what replay needs: the model, and the simulation's state and controls of every step.
+        videos: Store the images of the cameras as videos. Without them, ``mjsense render`` makes the videos of chosen
+            episodes afterwards.
         Others:
         sensors: Additional sensors, as in :func:`mjsense.record`.
         ray: ``local``, ``auto`` or the address of a Ray cluster, as in :func:`mjsense.record`.
@@ -224,21 +227,13 @@ def play(
     if isinstance(made, ReplayedPolicy):
         made.check(_settings(options), range(numbers) if isinstance(numbers, int) else numbers)
         noise = bool(made.settings.get("action_noise", False))
-    if execution_horizon is None:
-        execution_horizon = getattr(made, "execution_horizon", None)
-    if ensemble is None:
-        ensemble = getattr(made, "ensemble", None)
-    timing = {"execution_horizon": execution_horizon, "ensemble": ensemble, "latency": latency or None}
-    if any(value is not None for value in timing.values()):
-        if not isinstance(made, Policy):
-            raise ValueError(f"policy '{made}' is computed together with its episode: it has neither chunks nor latency")
-        made = Timed(made, execution_horizon=execution_horizon, ensemble=ensemble, latency=latency)
+    made, timing = timed(made, execution_horizon, ensemble, latency)
     if benchmark is not None:
         benchmark.check_starts(int(options.get("num_worlds", 4)))
     about = {
         "policy": {"spec": spec, "name": made if isinstance(made, str) else made._mjs_name(), "fingerprint": fingerprint(made)},
         "benchmark": None if benchmark is None else {"name": benchmark.name, "checksum": benchmark.checksum},
-        "settings": {name: value for name, value in timing.items() if value is not None},
+        "settings": timing,
         "episodes": numbers if isinstance(numbers, int) else list(numbers),
     }
     begun = time.perf_counter()

@@ -115,6 +115,10 @@ def _of_object(policy: Any, options: dict[str, Any]) -> Policy:
         raise ValueError(f"policy {policy!r} is not a class, and has no option '{min(options)}'")
     if not isinstance(policy, Policy) and not hasattr(policy, "_mjs_policy") and hasattr(policy, "act"):
         return BatchedPolicy(policy)
+    if callable(getattr(policy, "get_action", None)) and not hasattr(policy, "_mjs_policy"):
+        from mjsense.compat.molmospaces.policy.base_policy import PolicyOfWorlds
+
+        return PolicyOfWorlds(policy)  # of molmo_spaces
     made = policy_of(policy)[1]
     if made is None:
         raise TypeError(f"policy is {policy!r}: expected a policy")

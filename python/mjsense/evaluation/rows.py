@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ import numpy as np
 
 from mjsense.core.representations import plain
 from mjsense.dataset import Dataset, Episode
+from mjsense.dataset.hdf5 import kept_open
 from mjsense.evaluation.intervals import wilson
 
 LATENCY = "obs/extra/policy_latency"
@@ -72,7 +74,11 @@ def key_of(row: Row) -> tuple[int, int, int]:
 
 def rows_of(dataset: Dataset) -> list[Row]:
     """The rows of all episodes of a data set."""
-    return [_row(episode) for episode in dataset.episodes]
+    rows = []
+    for path, episodes in itertools.groupby(dataset.episodes, lambda episode: episode.path):
+        with kept_open(path):
+            rows += [_row(episode) for episode in episodes]
+    return rows
 
 
 def _row(episode: Episode) -> Row:

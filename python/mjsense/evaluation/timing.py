@@ -13,6 +13,8 @@ from typing import Any, Literal
 import gymnasium
 import numpy as np
 
+from mjsense.core.arguments import checked
+from mjsense.evaluation.policies import policy_from
 from mjsense.sensors.sensor import Sensor
 from mjsense.tasks.policy import Policy
 
@@ -192,6 +194,45 @@ class Timed(Policy):
                 f"({self.num_worlds}, {width}) or ({self.num_worlds}, H, {width})"
             )
         return array
+
+
+def timed(
+    policy: Policy | str, execution_horizon: int | None, ensemble: float | None, latency: Latency
+) -> tuple[Policy | str, dict[str, Any]]:
+    """The policy with this timing, and what of it was chosen, here or by the policy itself."""
+    chosen = {
+        "execution_horizon": getattr(policy, "execution_horizon", None) if execution_horizon is None else execution_horizon,
+        "ensemble": getattr(policy, "ensemble", None) if ensemble is None else ensemble,
+        "latency": latency or None,
+    }
+    chosen = {name: value for name, value in chosen.items() if value is not None}
+    if not chosen:
+        return policy, {}
+    if not isinstance(policy, Policy):
+        raise ValueError(f"policy '{policy}' is computed together with its episode: it has neither chunks nor latency")
+    return Timed(policy, **chosen), chosen
+
+
+@checked
+def wrap_policy(
+    policy: Any,
+    *,
+    policy_options: Mapping[str, Any] | None = None,
+    execution_horizon: int | None = None,
+    ensemble: float | None = None,
+    latency: float | Literal["measured"] = 0.0,
+) -> Policy | str:
+    """The policy of :func:`mjsense.evaluate` for loops of ``env.step``: everything with an argument ``policy`` takes the result.
+
+    ::
+
+        env = mjs.make("pick", policy=mjs.wrap_policy("lerobot:run/checkpoints/last/pretrained_model", latency=0.1))
+        observation, info = env.reset(seed=0)
+        observation, reward, terminated, truncated, info = env.step(env.expert_action())
+
+    The arguments are those of :func:`mjsense.evaluate`.
+    """
+    return timed(policy_from(policy, **(policy_options or {})), execution_horizon, ensemble, latency)[0]
 
 
 class _LatencySensor(Sensor):

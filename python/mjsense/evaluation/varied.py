@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,30 +25,43 @@ from mjsense.tasks.vector import make_vec
 
 UNCHANGED = "unchanged"
 _TRIED = 4  # episodes in which a factor must change something
-_SCENES = {
-    "light": '[[vary]]\nwhat = "light"\npattern = ".*"\nbrightness = [0.4, 1.6]\nhue = 20\nangle = 20\n',
-    "texture": (
-        '[[vary]]\nwhat = "material"\npattern = "(?!robot_0/).*"\nbrightness = [0.6, 1.3]\nhue = 40\nsaturation = 0.25\n\n'
-        '[[vary]]\nwhat = "geom"\npattern = "(?!robot_0/).*"\noptional = true\nbrightness = [0.6, 1.3]\nhue = '
-        "40\nsaturation = 0.25\n"
-    ),
-    "distractors": "count = [1000, 1000]\n",  # all that the scene has
-    "start": "[robot]\npos_spread = [0.05, 0.05]\nyaw_spread = 10\n",
-}
-"""What a scene that extends that of the evaluation adds to it."""
-_CAMERA_NOISE = "pos_noise = [0.03, 0.03, 0.03]\nrot_noise = [4, 4, 4]\n"
+MAX_STRENGTH = 1.5
+_ALL = 1000  # more objects than a scene has
 FACTORS = {
-    "light": "brightness, colour and direction of the lights",
+    "light": "brightness by 60 %, hue by 20 degrees and direction by 20 degrees of the lights",
     "camera": "poses of the cameras: 3 cm and 4 degrees",
-    "texture": "colours of everything but the robot",
-    "distractors": "all objects of the scene are present",
+    "texture": "colours of everything but the robot: brightness by 40 %, hue by 40 degrees and saturation by 0.25",
+    "distractors": "all objects of the scene are present, or as many as distractors=5 says",
     "instruction": "the canonical sentence instead of paraphrases, or the reverse",
     "start": "place of the robot: 5 cm and 10 degrees more",
     "latency": "delay of the actions, in seconds: latency=0.1",
 }
-"""The factors, and what each changes."""
+"""The factors, and what each changes by how much at most; light=0.5 is half as much."""
 _SAME_START = ("light", "camera", "texture", "instruction", "latency")
 """Factors that do not change the state in which an episode starts."""
+
+
+def _light(strength: float) -> str:
+    return _colours("light", ".*", 0.6 * strength, 0.6 * strength, 20 * strength) + f"angle = {20 * strength}\n"
+
+
+def _texture(strength: float) -> str:
+    colours = [_colours(what, "(?!robot_0/).*", 0.4 * strength, 0.3 * strength, 40 * strength) for what in ("material", "geom")]
+    saturation = f"saturation = {0.25 * strength}\n"
+    return f"{colours[0]}{saturation}\n{colours[1]}{saturation}optional = true\n"
+
+
+def _colours(what: str, pattern: str, darker: float, brighter: float, hue: float) -> str:
+    return f'[[vary]]\nwhat = "{what}"\npattern = "{pattern}"\nbrightness = [{1 - darker}, {1 + brighter}]\nhue = {hue}\n'
+
+
+_SCENES: dict[str, Callable[[float], str]] = {
+    "light": _light,
+    "texture": _texture,
+    "distractors": lambda count: f"count = [{count:.0f}, {count:.0f}]\n",
+    "start": lambda strength: f"[robot]\npos_spread = [{0.05 * strength}, {0.05 * strength}]\nyaw_spread = {10 * strength}\n",
+}
+"""What a scene that extends that of the evaluation adds to it, by the strength of the factor, or by the number of objects."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +90,7 @@ def sensitivity(vary: Iterable[str], **options: Any) -> Sensitivity:
 
     Args:
         vary: Names of factors: ``light``, ``camera``, ``texture``, ``distractors``, ``instruction``, ``start``, ``latency=0.1``.
+            ``light=0.5`` changes half as much; ``distractors=5`` is the number of objects.
         options: Arguments of :func:`mjsense.evaluation.evaluate`. The evaluations are in the folders ``out/unchanged``,
             ``out/light`` and so on.
 
@@ -97,7 +112,7 @@ def play_varied(options: dict[str, Any], policy: Any, vary: list[str], **argumen
         options = {**benchmark.options(options), "episodes": benchmark.episodes}
     base = {name: value for name, value in options.items() if name != "out"}
     out.mkdir(parents=True, exist_ok=True)
-    cases = {_folder_of(text): _changes(text, base, out) for text in vary}
+    cases = {text: _changes(text, *_factor_of(text), base, out) for text in vary}
     _check(base, cases)
     found: dict[str, Results] = {}
     for name, (changed, more) in {UNCHANGED: ({}, {}), **cases}.items():
@@ -111,23 +126,34 @@ def play_varied(options: dict[str, Any], policy: Any, vary: list[str], **argumen
     return made
 
 
-def _folder_of(text: str) -> str:
-    name, _, value = text.partition("=")
+def _factor_of(text: str) -> tuple[str, float]:
+    """The name of a factor, and its strength, number of objects, or seconds."""
+    name, equals, value = text.partition("=")
     if name not in FACTORS:
         raise ValueError(f"vary: '{name}' is not a factor{did_you_mean(name, FACTORS, 'there are')}")
-    if (name == "latency") != bool(value):
-        raise ValueError(f"vary: '{text}': {'give seconds, latency=0.1' if name == 'latency' else 'this factor has no value'}")
-    return text
+    if name == "instruction" and equals:
+        raise ValueError(f"vary: '{text}': this factor has no strength")
+    if name == "latency" and not equals:
+        raise ValueError(f"vary: '{text}': give seconds, latency=0.1")
+    if not equals:
+        return name, _ALL if name == "distractors" else 1.0
+    try:
+        number = float(value)
+    except ValueError:
+        number = math.nan
+    if name == "latency" and not 0 <= number < math.inf:
+        raise ValueError(f"vary: '{text}': must be seconds, such as latency=0.1")
+    if name == "distractors" and number not in range(1, _ALL + 1):
+        raise ValueError(f"vary: '{text}': must be a number of objects from 1 on, such as distractors=5")
+    if name not in ("latency", "distractors") and not 0 < number <= MAX_STRENGTH:
+        raise ValueError(f"vary: '{text}': the strength must be above 0 and at most {MAX_STRENGTH}; 1 is the default")
+    return name, number
 
 
-def _changes(text: str, base: Mapping[str, Any], out: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+def _changes(text: str, name: str, strength: float, base: Mapping[str, Any], out: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """The options of a recording, and the arguments of ``play``, that a factor changes."""
-    name, _, value = text.partition("=")
     if name == "latency":
-        try:
-            return {}, {"latency": float(value)}
-        except ValueError:
-            raise ValueError(f"vary: '{text}': must be seconds, such as latency=0.1") from None
+        return {}, {"latency": strength}
     if name == "instruction":
         return {"instructions": "varied" if base.get("instructions") == "canonical" else "canonical"}, {}
     parts = {key: base[key] for key in ("task", "robot", "scene", "split") if base.get(key)}
@@ -137,19 +163,19 @@ def _changes(text: str, base: Mapping[str, Any], out: Path) -> tuple[dict[str, A
     if name == "camera":
         if base.get("camera_system") or base.get("cameras") == []:
             raise ValueError("vary: 'camera' moves the cameras of the robot's model; leave out camera_system, and render cameras")
-        return {"camera_system": _written(out / "camera.toml", _cameras(Robot(robot)))}, {}
+        return {"camera_system": _written(out / f"{text}.toml", _cameras(Robot(robot), strength))}, {}
     scene, _, part = scene.partition("@")
     extended = str(Path(scene).resolve()) if scene.endswith(".toml") else scene
-    text = f'name = "{name}"\nextends = "{extended}"\n{_SCENES[name]}'
-    changed = {"scene": _written(out / f"{name}.toml", text)}
+    varied = f'name = "{text}"\nextends = "{extended}"\n{_SCENES[name](strength)}'
+    changed = {"scene": _written(out / f"{text}.toml", varied)}
     return {**changed, "split": part} if part else changed, {}
 
 
-def _cameras(robot: Robot) -> str:
+def _cameras(robot: Robot, strength: float) -> str:
     width, height = robot.image_size
-    mounts = [
-        f'[[cameras]]\nname = "{one.name}"\nmount = "mjcf"\ncamera = "{one.camera}"\n{_CAMERA_NOISE}' for one in robot.cameras
-    ]
+    pos, rot = 3 * [0.03 * strength], 3 * [4 * strength]
+    noise = f"pos_noise = {pos}\nrot_noise = {rot}\n"
+    mounts = [f'[[cameras]]\nname = "{one.name}"\nmount = "mjcf"\ncamera = "{one.camera}"\n{noise}' for one in robot.cameras]
     return "\n".join([f'name = "camera"\nwidth = {width}\nheight = {height}\n', *mounts])
 
 

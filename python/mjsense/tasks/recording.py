@@ -79,6 +79,7 @@ def record(
     shard: str = "",
     keep_failures: bool = False,
     replay: bool = True,
+    videos: bool = True,
     # end of options
     sensors: Iterable[Any] = (),
     format: str = "mjsense",
@@ -178,6 +179,8 @@ def record(
             directory; requires ``num_attempts``, the number of attempts of all shards.
         keep_failures: Keep failed episodes too.
         replay: Store what replay needs: the model, and the simulation's state and controls of every step.
+        videos: Store the images of the cameras as videos. Without them, ``mjsense render`` makes the videos of chosen
+            episodes afterwards.
         Others:
         sensors: Additional sensors: user-defined ones with an observation_space or is_dict, ones of the core suite, or ones
             written for MolmoSpaces. They are recorded with the suite. If a sensor fails in a world, that world's episode is

@@ -39,6 +39,7 @@ struct RecordingCfg : FilesCfg {
   // Initialized sensors, in the order of the suite. They must outlive the recorder. All their
   // fields are recorded.
   std::vector<const Sensor*> sensors;
+  bool videos = true;  // false: fields that would be videos are left out
   // JSON text of the settings that produced the data (task, robot, seed ...). It is stored in every
   // file, and a recording can only be resumed with equal settings.
   std::string settings = "{}";

@@ -246,6 +246,7 @@ RecordingPlan plan_recording(const RecordingCfg& cfg) {
       continue;
     }
     for (const Field& field : sensor->fields()) {
+      if (!cfg.videos && field.spec.storage != Storage::kArray) continue;
       note(field.spec);
       if (field.spec.storage == Storage::kArray) {
         add_array({.spec = field.spec, .field = &field, .present = presence_of(*sensor, field)});

@@ -173,15 +173,17 @@ bool ForeignArrays::add_model(const std::string& field, const ArrayView& rows) {
   const std::size_t element = dtype_size(rows.dtype), bytes = count * element;
   added.seen.resize(bytes * num_rows);
   std::vector<std::byte> shown(bytes);
-  for (int w = 0; w < worlds_.size(); ++w) {
-    const mjModel mine = worlds_.model_of(w);
-    const void* values = model_values(mine, field);
+  int own_count = 0, own_element = 0;
+  const auto* own = static_cast<const std::byte*>(
+      mjb_expanded(worlds_.batch(), field.c_str(), &own_count, &own_element));
+  const std::size_t own_bytes = static_cast<std::size_t>(own_count) * own_element;
+  for (int w = 0; w < (own ? worlds_.size() : num_rows); ++w) {
+    const void* values = own ? own + own_bytes * w : model_values(*m, field);
     std::byte* seen = added.seen.data() + w % num_rows * bytes;
     if (w < num_rows) {
       show_elements(values, found->type, seen, rows.dtype, count);
       continue;
     }
-    if (values == model_values(*m, field)) continue;
     // Elements that differ between the worlds of a row are the program's from now on.
     const std::byte* now = added.rows + w % num_rows * added.row_bytes;
     show_elements(values, found->type, shown.data(), rows.dtype, count);

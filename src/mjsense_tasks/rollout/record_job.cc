@@ -37,6 +37,7 @@ record::RecordingCfg recording_cfg(const RecordJobCfg& job, Rollout& rollout,
   cfg.first_attempt = job.first_attempt;
   cfg.attempts.assign(job.attempts.begin(), job.attempts.end());
   cfg.num_worlds = rollout.num_worlds();
+  cfg.videos = job.videos;
   cfg.fps = record::Fps::from_period_ms(rollout.task().cfg().policy_dt_ms);
   for (const auto& sensor : rollout.suite().sensors()) cfg.sensors.push_back(sensor.get());
   if (const Sensor* replay = rollout.replay_sensor()) {
@@ -63,6 +64,7 @@ class RecordJob {
         end_(cfg_.num_attempts > 0   ? cfg_.num_attempts
              : cfg_.max_attempts > 0 ? cfg_.max_attempts
                                      : 6 * std::int64_t{cfg_.episodes}) {
+    if (!cfg_.videos) return;
     for (const RecordedCamera& camera : rollout_.cameras()) pictures_ += camera.depth ? 2 : 1;
   }
 

@@ -26,6 +26,7 @@ struct RecordJobCfg : record::FilesCfg {
   std::string shard;  // "2/8"; "": not a shard
   bool keep_failures = false;
   bool replay = true;
+  bool videos = true;
 };
 template <class V>
 void visit_fields(V& v, RecordJobCfg& c) {
@@ -50,6 +51,10 @@ void visit_fields(V& v, RecordJobCfg& c) {
   v("keep_failures", c.keep_failures, "Keep failed episodes too.").decides_data();
   v("replay", c.replay,
     "Store what replay needs: the model, and the simulation's state and controls of every step.");
+  v("videos", c.videos,
+    "Store the images of the cameras as videos. Without them, ``mjsense render`` makes the videos "
+    "of "
+    "chosen episodes afterwards.");
 }
 
 // A job without `shard`: that part of the attempts, in its own directory. The shards are contiguous

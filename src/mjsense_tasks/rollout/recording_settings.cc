@@ -106,7 +106,8 @@ Json checksums_of(const T& object) {
 Json cameras_of(const Rollout& rollout) {
   Json cameras = Json::array();
   for (const RecordedCamera& camera : rollout.cameras()) {
-    Json entry{{"depth", camera.depth},
+    Json entry{{"camera", camera.mjcf_camera},
+               {"depth", camera.depth},
                {"height", camera.height},
                {"name", camera.name},
                {"width", camera.width}};

@@ -2,7 +2,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <numbers>
+#include <span>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/model_geometry.h"
@@ -43,6 +46,18 @@ bool touches(const mjModel* m, int body) {
 double min_extent(const episode::ObjectShape& shape) {
   const Vec3 size = aabb_of(shape.points).size();
   return std::min({size.x, size.y, size.z});
+}
+
+// Smallest horizontal extent of an object in its resting orientations, m. A hand closes horizontally
+// on an object that lies on a support: a finger would have to be below a flat disc otherwise.
+double min_width(const episode::ObjectShape& shape, std::span<const Quat> rests) {
+  const Vec3 size = aabb_of(shape.points).size();
+  double width = std::numeric_limits<double>::infinity();
+  for (Quat rest : rests) {
+    const Vec3 turned = rotate(rest, size);
+    width = std::min({width, std::abs(turned.x), std::abs(turned.y)});
+  }
+  return width;
 }
 
 // A gripper grasps an object at its smallest extent.
@@ -162,7 +177,9 @@ int EpisodeScene::draw(int world, std::span<const int> of, const robots::Robot& 
   double opening = 0;
   for (const robots::MoveGroup& group : robot.groups())
     opening = std::max(opening, group.max_opening);
-  const auto fits = [&](int i) { return min_extent(shape(world, i)) <= opening - kBeside; };
+  const auto fits = [&](int i) {
+    return min_width(shape(world, i), objects_[i].rests) <= opening - kBeside;
+  };
   const bool some = std::ranges::any_of(of, fits);
   for (;;) {
     const int drawn = of[rng.below(static_cast<std::uint32_t>(of.size()))];

@@ -236,6 +236,29 @@ if not mujoco.__version__.startswith("4."):
     raises(ValueError, r"^mujoco_warp on the CPU: the model has flexes, which cannot be simulated from MuJoCo 3", lambda pair=pair: mjw.step(*pair))
     pair = None
 
+# A graph steps when it is launched, not while it is captured, in the order of its other kernels; and errors are raised then.
+graphed, direct = start(), start()
+at_first = graphed[1].qpos.numpy().copy()
+with wp.ScopedCapture() as capture:
+    for _ in range(2):
+        mjw.step(*graphed)
+        wp.copy(graphed[1].ctrl, graphed[1].qpos.flatten()[: graphed[1].ctrl.size].reshape(graphed[1].ctrl.shape))
+np.testing.assert_array_equal(graphed[1].qpos.numpy(), at_first)
+for _ in range(3):
+    wp.capture_launch(capture.graph)
+for _ in range(6):
+    mjw.step(*direct)
+    direct[1].ctrl.numpy()[:] = direct[1].qpos.numpy().ravel()[: direct[1].ctrl.size].reshape(direct[1].ctrl.shape)
+np.testing.assert_array_equal(graphed[1].qpos.numpy(), direct[1].qpos.numpy())
+few = start(nconmax=0)
+few[1].qpos.numpy()[:, 2] = 0.09
+with wp.ScopedCapture() as failing:
+    mjw.step(*few)
+raises(ValueError, r"make it with nconmax=\d+", lambda: wp.capture_launch(failing.graph))
+wp.capture_launch(capture.graph)  # works after the error of another one
+assert len(compat._in_graphs) == 3
+capture = failing = graphed = None
+
 # Two simulations in two threads.
 pairs, alone = [start(), start()], start()
 runs = [threading.Thread(target=lambda pair=pair: [mjw.step(*pair) for _ in range(50)]) for pair in pairs]
@@ -257,4 +280,4 @@ program = few = called = pairs = alone = None
 import gc
 
 gc.collect()
-assert (len(compat._worlds), len(compat._models)) < kept
+assert (len(compat._worlds), len(compat._models)) < kept and not compat._in_graphs

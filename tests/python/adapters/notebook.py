@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs the cells of a notebook with the images of mjsense, and compares them with those of the packages that the notebook uses.
 
-    python notebook.py mujoco|dm_control NOTEBOOK PSNR [CHECKOUT...]
+    python notebook.py mujoco|dm_control|mujoco_warp NOTEBOOK PSNR [CHECKOUT...]
 
-mujoco: mjsense.Renderer is mujoco.Renderer. dm_control: after mjsense.compat.dm_control.use(). Cells see the checkouts (folders of
+mujoco: mjsense.Renderer is mujoco.Renderer. dm_control, mujoco_warp: after mjsense.compat.PACKAGE.use(); states are compared, too. Cells see the checkouts (folders of
 repositories that the notebook clones) in their working directory, and run even if an earlier one has failed. Simulated times and numbers of
 frames are a tenth of the notebook's. Lines for the shell and for IPython are left out and listed. Ends with an error if a cell fails that
 does not fail with the packages' own images, or if an image differs.
@@ -15,6 +15,7 @@ import os
 import re
 import sys
 import tempfile
+import time
 import traceback
 import types
 from pathlib import Path
@@ -25,6 +26,8 @@ require_opengl()
 import mujoco
 import numpy as np
 from compared import EACH, FIRST, THEIRS, Compared, quality_of
+
+import mjsense
 
 
 def stub(name, **members):
@@ -39,11 +42,12 @@ def stub(name, **members):
 def prepare():
     """What notebooks import in order to show images."""
     os.environ["COLAB_NOTEBOOK_TEST"] = "1"  # dm_control's makes no videos then
-    import matplotlib
-    import pygments.formatters
-    import pygments.lexers  # noqa: F401
+    with contextlib.suppress(ImportError):  # mujoco_warp's needs neither
+        import matplotlib
+        import pygments.formatters
+        import pygments.lexers  # noqa: F401
 
-    matplotlib.use("Agg")
+        matplotlib.use("Agg")
     with contextlib.suppress(ImportError):
         import google.protobuf  # noqa: F401  # dm_control's soccer uses it
     if "google" not in sys.modules:
@@ -60,12 +64,13 @@ def code_of(source):
     source = re.sub(r"^(\s*)[!%].*$", r"\1pass", source, flags=re.M)
     source = re.sub(r"^(\s*(?:duration|n_seconds) *= *)([\d.]+)", lambda m: f"{m[1]}{float(m[2]) / 10}", source, flags=re.M)
     source = re.sub(r"^(\s*n_frames *= *)(\d+)", lambda m: f"{m[1]}{max(2, int(m[2]) // 10)}", source, flags=re.M)
+    source = re.sub(r"range\(3 \* 60\)", "range(18)", source)
     source = re.sub(r"^if subprocess.run\('nvidia-smi'\).returncode:.*?(?=^\S)", "", source, flags=re.M | re.S)
     return re.sub(r"^NVIDIA_ICD_CONFIG_PATH = .*?^\"\"\"\)\n", "", source, flags=re.M | re.S)
 
 
-def run(cells, what):
-    """Runs the cells, and returns the errors by cell."""
+def run(cells, what, after=lambda names: None):
+    """Runs the cells, and returns the errors by cell. `after`: called after each cell, with its variables."""
     names = {"__name__": "__main__"}
     np.random.seed(0)
     errors = {}
@@ -73,6 +78,7 @@ def run(cells, what):
         Compared.cell = number
         try:
             exec(compile(code_of(cell), f"cell {number}", "exec"), names)
+            after(names)
         except BaseException as error:
             errors[number] = "".join(traceback.format_exception_only(error)).strip()[:300]
             print(f"cell {number} {what}: {errors[number]}", flush=True)
@@ -125,6 +131,47 @@ def run_dm_control(cells):
     return ours, theirs
 
 
+def run_mujoco_warp(cells):
+    """The errors with the functions of mjsense, and with mujoco_warp's own."""
+    import mediapy
+    import warp
+
+    from mjsense.compat import mujoco_warp
+
+    warp.set_device("cpu")
+    mujoco.Renderer = mjsense.Renderer  # faster, and the same in both
+    found = []
+    for context, what in ((contextlib.nullcontext(), "without mjsense"), (mujoco_warp.used(), "with mjsense")):
+        images, states, seconds = {}, {}, {}
+
+        def show(image, *_, images=images, **__):
+            images.setdefault(Compared.cell, []).extend(image if isinstance(image, list) else [image])
+
+        def keep(names, states=states, seconds=seconds):
+            seconds[Compared.cell] = time.process_time()
+            if isinstance(qpos := getattr(names.get("data"), "qpos", None), warp.array):
+                states[Compared.cell] = qpos.numpy().copy()
+
+        mediapy.show_video = mediapy.show_image = show
+        with context:
+            errors = run(cells, what, keep)
+        found.append((errors, images, states, seconds))
+    (theirs, images, states, seconds), (ours, our_images, our_states, our_seconds) = found
+    assert images.keys() == our_images.keys() and states.keys() == our_states.keys(), "cells have shown other images"
+    for cell, pictures in images.items():
+        for image, other in zip(our_images[cell], pictures, strict=True):
+            Compared.images += 1
+            same = quality_of(image, other) if image.dtype == np.uint8 else 99 * np.isclose(image, other, atol=1e-3).all(-1).mean()
+            Compared.worst[cell] = min(Compared.worst.get(cell, 99), same)
+    for cell, qpos in states.items():
+        print(f"cell {cell}: {len(qpos)} worlds, positions differ by at most {np.abs(our_states[cell] - qpos).max():.1e}")
+        np.testing.assert_allclose(our_states[cell], qpos, atol=1e-4)
+    for cell in [*seconds][1:]:
+        spent = (one[cell] - one[cell - 1] for one in (seconds, our_seconds))
+        print(f"cell {cell}: {next(spent):.2f} s of CPU time with mujoco_warp's own kernels, {next(spent):.2f} s with mjsense")
+    return ours, theirs
+
+
 def main():
     package, notebook, psnr, checkouts = sys.argv[1], Path(sys.argv[2]).resolve(), float(sys.argv[3]), sys.argv[4:]
     cells = ["".join(c["source"]) for c in json.loads(notebook.read_text())["cells"] if c["cell_type"] == "code"]
@@ -136,7 +183,8 @@ def main():
             os.symlink(Path(checkout).resolve(), Path(folder, Path(checkout).name))
         os.chdir(folder)
         prepare()
-        ours, theirs = {"mujoco": run_mujoco, "dm_control": run_dm_control}[package](cells)
+        runs = {"mujoco": run_mujoco, "dm_control": run_dm_control, "mujoco_warp": run_mujoco_warp}
+        ours, theirs = runs[package](cells)
         os.chdir("/")
     for number, quality in sorted(Compared.worst.items()):
         print(f"cell {number}: {quality:.1f} dB")

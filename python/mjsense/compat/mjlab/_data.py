@@ -24,4 +24,6 @@ class Data:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
+        if name == "time":
+            return self._tensors(name, self._native.time)
         return self._tensors(name, getattr(self._native.data, name))

@@ -32,16 +32,22 @@ def ids(env_ids: Any) -> Any:
     return env_ids.detach().cpu().numpy() if hasattr(env_ids, "detach") else env_ids  # pyright: ignore
 
 
+def memory_of(array: Any) -> Any:
+    """The object that owns the memory of an array. Sensors return views of the same memory on every read."""
+    base = getattr(array, "base", None)
+    return array if base is None else base
+
+
 class Cache:
-    """Keeps one tensor for each array, because sensors return the same arrays on every read."""
+    """Keeps one tensor for each array."""
 
     def __init__(self) -> None:
-        self._known: dict[str, tuple[np.ndarray, Any]] = {}
+        self._known: dict[str, tuple[Any, Any]] = {}
 
     def __call__(self, name: str, array: np.ndarray | None) -> Any:
         if array is None:
             return None
         known = self._known.get(name)
-        if known is None or known[0] is not array:
-            known = self._known[name] = array, tensor(array)
+        if known is None or known[0] is not memory_of(array):
+            known = self._known[name] = memory_of(array), tensor(array)
         return known[1]

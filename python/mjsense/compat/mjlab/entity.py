@@ -10,6 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from mjsense.compat.mjlab._entity_data import EntityData
 from mjsense.compat.mjlab._names import find, value_of
 from mjsense.compat.mjlab.actuator import ActuatorCfg, TransmissionType, XmlActuatorCfg
 from mjsense.sensors import configs
@@ -121,6 +122,9 @@ def _add_keyframe(spec: mujoco.MjSpec, cfg: EntityCfg) -> None:
 class Entity:
     """An attached entity: the local names of its elements in model order. ``native`` is the :class:`mjsense.scene.Entity`."""
 
+    _data: EntityData | None = None
+    """Once there is a simulation."""
+
     def __init__(self, native: Any, cfg: Any) -> None:
         self.native = native
         self.cfg = cfg
@@ -191,6 +195,51 @@ class Entity:
     def find_tendons(self, name_keys: str | Sequence[str], preserve_order: bool = False) -> tuple[list[int], list[str]]:
         """Like find_bodies(), for tendons."""
         return find(name_keys, self.tendon_names, "tendon", preserve_order)
+
+    @property
+    def data(self) -> EntityData:
+        """The state in all worlds."""
+        if self._data is None:
+            raise RuntimeError(f"entity '{self.native.name}' has no data yet: make a Simulation of its scene")
+        return self._data
+
+    # Writers: ``env_ids`` are ids or a mask of the worlds, by default of all. Then call ``forward()``.
+
+    def write_root_state_to_sim(self, root_state: Any, env_ids: Any = None) -> None:
+        """Pose (m, wxyz), linear and angular velocity of the root in the world's frame, ``[N, 13]``."""
+        if root_state.shape[-1] != 13:
+            raise ValueError(f"write_root_state_to_sim: root_state has {root_state.shape[-1]} columns, not 13")
+        self.write_root_link_pose_to_sim(root_state[:, :7], env_ids)
+        self.write_root_link_velocity_to_sim(root_state[:, 7:], env_ids)
+
+    def write_root_link_pose_to_sim(self, root_pose: Any, env_ids: Any = None) -> None:
+        self.data.write_root_pose(root_pose, env_ids)
+
+    def write_root_link_velocity_to_sim(self, root_velocity: Any, env_ids: Any = None) -> None:
+        """Of the root's origin, in the world's frame, ``[N, 6]``; the pose is that in ``qpos``."""
+        self.data.write_root_velocity(root_velocity, env_ids)
+
+    def write_root_link_velocity_b_to_sim(self, root_velocity_b: Any, env_ids: Any = None) -> None:
+        """In the root's frame."""
+        self.data.write_root_velocity(root_velocity_b, env_ids, in_body=True)
+
+    def write_root_com_velocity_to_sim(self, root_velocity: Any, env_ids: Any = None) -> None:
+        """Of the root's centre of mass, in the world's frame."""
+        self.data.write_root_velocity(root_velocity, env_ids, of_mass=True)
+
+    def write_joint_state_to_sim(self, position: Any, velocity: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        """``[N, joints]``, without the free joint."""
+        self.write_joint_position_to_sim(position, joint_ids, env_ids)
+        self.write_joint_velocity_to_sim(velocity, joint_ids, env_ids)
+
+    def write_joint_position_to_sim(self, position: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self.data.write_joints("qpos", position, joint_ids, env_ids)
+
+    def write_joint_velocity_to_sim(self, velocity: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self.data.write_joints("qvel", velocity, joint_ids, env_ids)
+
+    def write_ctrl_to_sim(self, ctrl: Any, ctrl_ids: Any = None, env_ids: Any = None) -> None:
+        self.data.write_joints("ctrl", ctrl, ctrl_ids, env_ids)
 
 
 __all__ = ["Entity", "EntityArticulationInfoCfg", "EntityCfg"]

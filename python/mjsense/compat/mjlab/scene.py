@@ -12,9 +12,18 @@ import mujoco
 
 import mjsense
 from mjsense import _core
+from mjsense.compat.mjlab._entity_data import EntityData
 from mjsense.compat.mjlab._tensors import ids, tensor
 from mjsense.compat.mjlab.entity import Entity, EntityCfg
-from mjsense.compat.mjlab.sensor import BuiltinSensor, CameraSensor, RayCastSensor, Sensor, SensorCfg, SensorContext
+from mjsense.compat.mjlab.sensor import (
+    BuiltinSensor,
+    CameraSensor,
+    CameraSensorCfg,
+    RayCastSensor,
+    Sensor,
+    SensorCfg,
+    SensorContext,
+)
 from mjsense.compat.mjlab.sensor.sensor import GivenSensor, OwnSensor, native_sensor
 from mjsense.compat.mjlab.terrains import TerrainEntityCfg
 from mjsense.core import mujoco_names
@@ -40,6 +49,11 @@ class SceneCfg:
             self.terrain.edit_scene(spec)
         if self.spec_fn is not None:
             self.spec_fn(spec)
+        for cfg in self.sensors:
+            if isinstance(cfg, CameraSensorCfg) and cfg.camera_name is not None and cfg.fovy is not None:
+                camera = spec.camera(cfg.camera_name)  # None: the scene says which there are
+                if camera is not None:
+                    camera.fovy = cfg.fovy
 
     def native(self) -> configs.SceneCfg:
         """The equivalent mjsense configuration, checked. Builds user-defined sensors."""
@@ -160,11 +174,21 @@ class Scene:
         """Updates air times and histories. Call after a physics step."""
         if self._simulation is not None:
             self._simulation.update_sensors(dt)
+        for sensor in self._sensors.values():
+            sensor._kept = None
 
     def reset(self, env_ids: Any = None) -> None:
         """Resets the sensors of these worlds, by default of all."""
         if self._simulation is not None:
             self._simulation.reset_sensors(ids(env_ids))
+        for sensor in self._sensors.values():
+            sensor._kept = None
+
+    def _begin(self, simulation: Any) -> None:
+        """The worlds exist."""
+        self._simulation = simulation
+        for entity in self._entities.values():
+            entity._data = EntityData(entity.native, simulation)
 
 
 __all__ = ["Scene", "SceneCfg"]

@@ -20,7 +20,7 @@ against.
 from mjsense.compat.molmospaces.env.abstract_sensors import Sensor, SensorSuite
 from mjsense.compat.molmospaces.env.sensors import *  # noqa: F403
 from mjsense.compat.molmospaces.env.sensors import __all__ as _sensors
-from mjsense.compat.molmospaces.policy.base_policy import BasePolicy, PlannerPolicy
+from mjsense.compat.molmospaces.policy.base_policy import BasePolicy, InferencePolicy, PlannerPolicy, StatefulPolicy
 from mjsense.compat.molmospaces.program import stop, use, used
 from mjsense.compat.molmospaces.robots.abstract import Robot
 from mjsense.compat.molmospaces.tasks.task import BaseMujocoTask
@@ -29,10 +29,12 @@ from mjsense.compat.molmospaces.utils.save_utils import byte_array_to_string, di
 __all__ = [
     "BaseMujocoTask",
     "BasePolicy",
+    "InferencePolicy",
     "PlannerPolicy",
     "Robot",
     "Sensor",
     "SensorSuite",
+    "StatefulPolicy",
     "byte_array_to_string",
     "dict_to_byte_array",
     "is_camera_sensor",

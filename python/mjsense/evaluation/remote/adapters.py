@@ -51,7 +51,8 @@ threshold = 0.5
 from = [0.0, 1.0]
 to = [0.0, 255.0]
 """
-_BUILT_IN = ("streams", "features", "droid")
+BUILT_IN = ("streams", "features", "droid")
+"""Names of adapters."""
 
 
 def adapter_of(name: str, streams: Streams, groups: Mapping[str, slice], observed: Sequence[str] | None = None) -> Adapter:
@@ -82,7 +83,7 @@ def declared(name: str) -> Adapter:
     if name == "droid":
         return adapter_of_table(tomllib.loads(DROID), name)
     if not name.endswith(".toml"):
-        raise ValueError(f"adapter '{name}' is neither a file .toml nor a name{did_you_mean(name, _BUILT_IN, 'names are')}")
+        raise ValueError(f"adapter '{name}' is neither a file .toml nor a name{did_you_mean(name, BUILT_IN, 'names are')}")
     return adapter_of_table(read_toml(name), name)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import ssl
 import sys
 import threading
 import weakref
@@ -16,6 +17,7 @@ from urllib.parse import urlsplit
 
 from mjsense.core.optional import optional
 from mjsense.core.representations import plain
+from mjsense.evaluation.remote.access import client_context, headers_of
 from mjsense.evaluation.remote.adapter import MJSENSE
 from mjsense.evaluation.remote.messages import MAX_BYTES, unpack
 
@@ -33,9 +35,12 @@ class Connections:
         url: ``ws://HOST:PORT`` or ``wss://HOST:PORT``.
         timeout: Time in which the server must accept a connection, and answer a message. [s]
         patience: Time for which a server that cannot be reached is tried again. [s]
+        key: The server's key; empty: none.
+        certificate: File with the certificate to trust; empty: those that the system trusts.
     """
 
-    def __init__(self, url: str, *, timeout: float, patience: float) -> None:
+    def __init__(self, url: str, *, timeout: float, patience: float, key: str = "", certificate: str = "") -> None:
+        self._headers, self._encryption = headers_of(key), client_context(url, certificate)
         self.url, self._timeout, self._patience = checked_url(url), timeout, patience
         self._library: Any = optional("websockets.asyncio.client", "evaluate", "a remote policy")
         self._errors: Any = optional("websockets.exceptions", "evaluate", "a remote policy")
@@ -127,6 +132,8 @@ class Connections:
             ping_interval=None,  # openpi's servers do not answer pings while they compute
             close_timeout=2,
             logger=_SILENT,
+            additional_headers=self._headers,
+            ssl=self._encryption,
         )
         try:
             metadata = self._read(await link.recv())
@@ -146,11 +153,20 @@ class Connections:
             try:
                 return await self._within(attempt(), "accepted a connection")
             except self._errors.InvalidStatus as error:
+                if error.response.status_code == 401:
+                    raise ConnectionError(
+                        f"{self.url} needs {'another' if self._headers else 'a'} key: the option key_file"
+                    ) from None
                 if error.response.status_code < 500:
                     raise ConnectionError(
                         f"{self.url} refuses websockets with the HTTP status {error.response.status_code}"
                     ) from None
                 last = error
+            except ssl.SSLCertVerificationError as error:
+                raise ConnectionError(
+                    f"{self.url}: its certificate is not trusted: {error.verify_message}; the option certificate names the "
+                    "file of one that is"
+                ) from None
             except (TimeoutError, ValueError, RuntimeError):
                 raise
             except (OSError, EOFError, self._errors.WebSocketException) as error:

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from mjsense.core.errors import printable
+from mjsense.evaluation.remote.access import key_of
 from mjsense.evaluation.remote.adapter import EPISODE, SEED, Adapter
-from mjsense.evaluation.remote.adapters import adapter_of, check_name, fingerprint_of
+from mjsense.evaluation.remote.adapters import BUILT_IN, adapter_of, check_name, fingerprint_of
 from mjsense.evaluation.remote.client import Connections, checked_url
 from mjsense.evaluation.remote.messages import pack
 from mjsense.tasks.policy import Policy
@@ -28,16 +29,29 @@ class RemotePolicy(Policy):
     Args:
         url: ``ws://HOST:PORT`` or ``wss://HOST:PORT``.
         adapter: ``droid``, ``features``, ``streams`` or a TOML file: the names and conventions of the messages. By default
-            ``streams``, if the server is ``mjsense serve``; other servers need one.
+            that of the server, if it is ``mjsense serve``; other servers need one.
         timeout: Time in which the server must answer. [s]
         patience: Time for which a server that cannot be reached is tried again. [s]
+        key_file: File with the server's key, which is sent as ``Authorization: Api-Key KEY``.
+        certificate: PEM file with the certificate of ``wss://HOST:PORT``, or of who signed it. By default
+            those that the system trusts.
     """
 
-    def __init__(self, url: str, *, adapter: str = "", timeout: float = 120.0, patience: float = 120.0) -> None:
+    def __init__(
+        self,
+        url: str,
+        *,
+        adapter: str = "",
+        timeout: float = 120.0,
+        patience: float = 120.0,
+        key_file: str = "",
+        certificate: str = "",
+    ) -> None:
         for name, value in (("timeout", timeout), ("patience", patience)):
             if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value < math.inf:
                 raise ValueError(f"policy '{url}': {name} is {value!r}: must be a positive number of seconds")
         self.url, self._timeout, self._patience = checked_url(url), float(timeout), float(patience)
+        self._access = {"key": key_of(key_file), "certificate": certificate}
         if adapter:
             check_name(adapter)
         self._made: Connections | None = None
@@ -48,10 +62,13 @@ class RemotePolicy(Policy):
                 raise ValueError(
                     f"policy '{url}': the server is not mjsense serve: name an adapter, droid, features or FILE.toml (--adapter)"
                 )
+            stated = self._server.get("adapter", "streams")
+            if not adapter and stated not in BUILT_IN:
+                raise ValueError(f"policy '{url}': the server has an adapter file: name a copy of it (--adapter)")
         except BaseException:
             self._connections.close()
             raise
-        self._adapter_name = adapter or "streams"
+        self._adapter_name = adapter or str(stated)
         self.name = _text(self._server.get("name")) or "remote"
         horizon, ensemble = self._server.get("execution_horizon"), self._server.get("ensemble")
         self.execution_horizon: int | None = horizon if type(horizon) is int and horizon > 0 else None
@@ -66,7 +83,7 @@ class RemotePolicy(Policy):
     @property
     def _connections(self) -> Connections:
         if self._made is None:
-            self._made = Connections(self.url, timeout=self._timeout, patience=self._patience)
+            self._made = Connections(self.url, timeout=self._timeout, patience=self._patience, **self._access)
             self._made.fingerprint = self._server.get("fingerprint")
         return self._made
 

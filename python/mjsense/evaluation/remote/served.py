@@ -11,10 +11,13 @@ import numpy as np
 from mjsense.core.errors import did_you_mean
 from mjsense.evaluation.policies import policy_from
 from mjsense.evaluation.protocol import BatchedPolicy, as_numbers
-from mjsense.evaluation.remote.adapter import EPISODE, PROMPT, SEED
-from mjsense.sensors.nested_streams import choose_streams, nest
+from mjsense.evaluation.remote.adapter import ACTIONS, EPISODE, PROMPT, SEED
+from mjsense.evaluation.remote.adapters import adapter_of
+from mjsense.evaluation.remote.served_adapter import ServedAdapter
+from mjsense.sensors.nested_streams import Streams, choose_streams, nest
 from mjsense.tasks.policy import FunctionPolicy
-from mjsense.tasks.vector import make_vec
+from mjsense.tasks.task import group_slices
+from mjsense.tasks.vector import TaskVectorEnv, make_vec
 
 
 class BadRequest(ValueError):
@@ -31,9 +34,13 @@ class ServedPolicy:
         task: Task and further arguments of :func:`mjsense.make_vec`, whose streams and move groups a :class:`mjsense.Policy`
             needs; empty: none.
         connections: Maximum number of connections.
+        adapter: Names and conventions of the messages, see :class:`mjsense.evaluation.RemotePolicy`; empty:
+            streams and actions as they are.
     """
 
-    def __init__(self, policy: Any, options: Mapping[str, Any], task: Mapping[str, Any], connections: int) -> None:
+    def __init__(
+        self, policy: Any, options: Mapping[str, Any], task: Mapping[str, Any], connections: int, adapter: str = ""
+    ) -> None:
         made = policy_from(policy, **options)
         if isinstance(made, str):
             raise ValueError(
@@ -44,25 +51,43 @@ class ServedPolicy:
         """Whether the policy receives the rows of one connection, and not of all worlds."""
         self.observation: list[str] | None = None if made.observation is None else list(made.observation)
         """Sensors or streams that the policy receives; None: all of a message."""
-        if self._alone:
+        self._adapter: ServedAdapter | None = None
+        self._env: TaskVectorEnv | None = None
+        if self._alone and not adapter:
             return
         if not task:
+            what = "is a mjsense.Policy, which knows the robot" if not self._alone else f"has the adapter '{adapter}'"
             raise ValueError(
-                f"policy '{self._name}' is a mjsense.Policy, which knows the robot: name a task, and the robot if "
-                "it is not the task's "
-                "(--task, --robot)"
+                f"policy '{self._name}' {what}: name a task, and the robot if it is not the task's (--task, --robot)"
             )
         self._env = make_vec(**task, num_envs=1)
         streams = [(sensor, spec, _rows_of(spec, connections)) for sensor, spec, _ in self._env._rollout.streams()]
+        by_name = {spec.name: (sensor, spec, rows) for sensor, spec, rows in streams}
         layout = self._env._rollout.action_layout()
-        simulation: Any = _NoSimulation(self._name, connections)
-        self._observed, _ = made._mjs_bind(simulation, streams, layout)
         self._groups = [group for group, low, _ in layout if low]
-        self.observation = choose_streams(made.observation, {spec.name: (sensor, spec, rows) for sensor, spec, rows in streams})
-        self._rows: dict[str, np.ndarray] = {spec.name: rows for _, spec, rows in streams}
+        if not self._alone:
+            simulation: Any = _NoSimulation(self._name, connections)
+            self._observed, _ = made._mjs_bind(simulation, streams, layout)
+            self._rows: dict[str, np.ndarray] = {spec.name: rows for _, spec, rows in streams}
+        if not self._alone or made.observation is not None:
+            self.observation = choose_streams(made.observation, by_name)
+        if adapter:
+            self._adapt(adapter, by_name, layout)
+
+    def _adapt(self, name: str, by_name: Streams, layout: list[Any]) -> None:
+        groups, specs = group_slices(layout), {stream: spec for stream, (_, spec, _) in by_name.items()}
+        made = adapter_of(name, by_name, groups, self.observation)
+        low, high = (np.concatenate([[], *(row[k] for row in layout)]) for k in (1, 2))
+        made.check(specs, groups, low, high)
+        self._adapter = ServedAdapter(made, specs, groups, self.observation)
+        self.observation = self._adapter.streams
+
+    def reply(self, actions: np.ndarray) -> dict[str, np.ndarray]:
+        """The answer that has these actions ``[H, n]``."""
+        return {ACTIONS: actions} if self._adapter is None else self._adapter.answer(actions)
 
     def close(self) -> None:
-        if not self._alone:
+        if self._env is not None:
             self._env.close()
 
     def begin(self, world: int, message: Mapping[str, Any], default_episode: int) -> None:
@@ -71,7 +96,7 @@ class ServedPolicy:
         if self._alone:
             self.policy.reset(np.array([world]))
         else:
-            self.policy._mjs_reset([world], [episode], seed, [_prompt(message)])
+            self.policy._mjs_reset([world], [episode], seed, [self._prompt(message)])
 
     def answer(self, world: int, message: Mapping[str, Any]) -> np.ndarray:
         """Actions ``[H, n]`` for an observation.
@@ -79,8 +104,8 @@ class ServedPolicy:
         Raises:
             BadRequest: The message is wrong.
         """
-        prompt, policy = _prompt(message), self.policy
-        numbers = _numbers({key: value for key, value in message.items() if key not in (PROMPT, SEED, EPISODE)})
+        prompt, policy = self._prompt(message), self.policy
+        numbers = self._numbers(message)
         if not self._alone:
             self._write(world, numbers)
             policy.instructions[world] = prompt
@@ -91,6 +116,18 @@ class ServedPolicy:
         if isinstance(policy, BatchedPolicy):
             return self._actions(policy.model.act({**observation, "world_ids": np.array([world]), "instructions": [prompt]}), 0)
         return self._actions(policy.act(observation), 0)
+
+    def _prompt(self, message: Mapping[str, Any]) -> str:
+        key = PROMPT if self._adapter is None else self._adapter.prompt
+        return _text(key, message.get(key, "")) if key else ""
+
+    def _numbers(self, message: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        if self._adapter is None:
+            return _numbers({key: value for key, value in message.items() if key not in (PROMPT, SEED, EPISODE)})
+        try:
+            return self._adapter.rows(message)
+        except ValueError as error:
+            raise BadRequest(str(error)) from None
 
     def _write(self, world: int, numbers: Mapping[str, np.ndarray]) -> None:
         """Writes an observation into the rows that the policy sees."""
@@ -145,11 +182,10 @@ def _rows_of(spec: Any, count: int) -> np.ndarray:
     return np.zeros((count, *spec.shape), np.uint8 if spec.is_dict else spec.dtype)
 
 
-def _prompt(message: Mapping[str, Any]) -> str:
-    prompt = message.get(PROMPT, "")
-    if not isinstance(prompt, str):
-        raise BadRequest(f"'{PROMPT}' is a {type(prompt).__name__}: must be a text")
-    return prompt
+def _text(key: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise BadRequest(f"'{key}' is a {type(value).__name__}: must be a text")
+    return value
 
 
 def _integer(message: Mapping[str, Any], key: str, default: int) -> int:

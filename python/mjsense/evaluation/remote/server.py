@@ -17,7 +17,9 @@ from mjsense import _core
 from mjsense.core.optional import optional
 from mjsense.core.representations import plain
 from mjsense.evaluation.playing import fingerprint
-from mjsense.evaluation.remote.adapter import ACTIONS, MJSENSE
+from mjsense.evaluation.remote.access import is_allowed, key_of, server_context
+from mjsense.evaluation.remote.adapter import MJSENSE
+from mjsense.evaluation.remote.adapters import BUILT_IN
 from mjsense.evaluation.remote.messages import MAX_BYTES, pack, unpack
 from mjsense.evaluation.remote.served import BadRequest, ServedPolicy
 
@@ -37,13 +39,19 @@ class PolicyServer:
     Args:
         policy: See :func:`mjsense.evaluation.policy_from`. Policies that are computed together with their episode, such as
             ``planner``, cannot be served.
-        task: Task whose streams and robot the policy knows; only a :class:`mjsense.Policy` needs it.
+        task: Task whose streams and robot the policy knows; only a :class:`mjsense.Policy` and an adapter need it.
         task_options: Further arguments of :func:`mjsense.make_vec`, such as ``robot``, ``camera_system``, ``width`` and
             ``height``.
         policy_options: Arguments of the policy.
+        adapter: ``droid``, ``features`` or a TOML file: the names and conventions of the clients' messages, as for
+            :class:`RemotePolicy`.
         host: Address to listen at. Every program that can connect to it can use the policy.
         port: Port; 0: any free one.
         connections: Maximum number of connections. Further ones are refused.
+        key_file: File with a key that clients must have: they send it as ``Authorization: Api-Key KEY``.
+            Empty: no key.
+        certificate, private_key: PEM files with which the server encrypts its connections, ``wss://HOST:PORT``. Empty: no
+            encryption.
         log: Called with a line for each error.
     """
 
@@ -54,9 +62,13 @@ class PolicyServer:
         task: str = "",
         task_options: Mapping[str, Any] | None = None,
         policy_options: Mapping[str, Any] | None = None,
+        adapter: str = "",
         host: str = "127.0.0.1",
         port: int = 8000,
         connections: int = 64,
+        key_file: str = "",
+        certificate: str = "",
+        private_key: str = "",
         log: Callable[[str], None] | None = None,
     ) -> None:
         if not host:
@@ -69,10 +81,11 @@ class PolicyServer:
             raise ValueError(f"connections is {connections}: must be at least 1")
         if not task and task_options:
             raise ValueError(f"{min(task_options)} belongs to a task, which is missing")
+        self._key, self._encryption = key_of(key_file), server_context(certificate, private_key)
         self._library: Any = optional("websockets.asyncio.server", "evaluate", "a policy server")
         self._closed_error: Any = optional("websockets.exceptions", "evaluate", "a policy server").ConnectionClosed
         of_task = {"task": task, **(task_options or {})} if task else {}
-        self._served = ServedPolicy(policy, policy_options or {}, of_task, connections)
+        self._served = ServedPolicy(policy, policy_options or {}, of_task, connections, adapter)
         self._log = log or (lambda line: None)
         self._free = list(range(connections))
         self._episodes = 0
@@ -81,6 +94,8 @@ class PolicyServer:
         about |= {"observation": self._served.observation} | {
             name: getattr(made, name, None) for name in ("execution_horizon", "ensemble")
         }
+        if adapter:
+            about["adapter"] = adapter if adapter in BUILT_IN else "a file"
         self._metadata = pack({MJSENSE: about})
         self._worker = ThreadPoolExecutor(1, "mjsense served policy")
         self._loop = asyncio.new_event_loop()
@@ -94,7 +109,8 @@ class PolicyServer:
                 f"cannot listen at {plain(host, 60)}, port {port}: {getattr(error, 'strerror', '') or error}"
             ) from None
         address, self.port = self._server.sockets[0].getsockname()[:2]
-        self.url: str = f"ws://[{address}]:{self.port}" if ":" in address else f"ws://{address}:{self.port}"
+        scheme = "ws" if self._encryption is None else "wss"
+        self.url: str = f"{scheme}://[{address}]:{self.port}" if ":" in address else f"{scheme}://{address}:{self.port}"
 
     @property
     def name(self) -> str:
@@ -129,10 +145,19 @@ class PolicyServer:
             max_size=MAX_BYTES,
             max_queue=1,
             origins=[None],  # pages of a browser may not connect
-            process_request=_answer_health_check,
+            process_request=self._answer_request,
+            ssl=self._encryption,
             close_timeout=2,
             logger=_SILENT,
         )
+
+    def _answer_request(self, link: Any, request: Any) -> Any:
+        """The answer to a request that is not to become a connection; None for others."""
+        if request.path == "/healthz":
+            return link.respond(http.HTTPStatus.OK, "OK\n")
+        if self._key and not is_allowed(request.headers, self._key):
+            return link.respond(http.HTTPStatus.UNAUTHORIZED, "This server needs the right key.\n")
+        return None
 
     async def _stop(self) -> None:
         self._server.close()
@@ -168,7 +193,7 @@ class PolicyServer:
             actions = await self._loop.run_in_executor(self._worker, self._answer, world, message, begins)
             begins = False
             timing = {"infer_ms": 1000 * (time.perf_counter() - begun)}
-            await link.send(pack({ACTIONS: actions, "server_timing": timing}, arrays))
+            await link.send(pack({**self._served.reply(actions), "server_timing": timing}, arrays))
 
     def _answer(self, world: int, message: Mapping[str, Any], begins: bool) -> Any:
         if begins:
@@ -187,10 +212,6 @@ def _read(data: Any) -> Any:
     if not isinstance(message.value, dict):
         raise BadRequest(f"a message is a {type(message.value).__name__}: must be a map")
     return message
-
-
-def _answer_health_check(link: Any, request: Any) -> Any:
-    return link.respond(http.HTTPStatus.OK, "OK\n") if request.path == "/healthz" else None
 
 
 _SILENT = logging.Logger("mjsense.websockets", logging.CRITICAL)

@@ -163,6 +163,11 @@ class RayCastSensor(NativeSensor[RayCastData]):
         return self.native.num_frames
 
     @property
+    def num_rays(self) -> int:
+        """F n."""
+        return self.num_frames * self.num_rays_per_frame
+
+    @property
     def num_rays_per_frame(self) -> int:
         """n."""
         return self.native.num_rays_per_frame

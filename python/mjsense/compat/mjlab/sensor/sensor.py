@@ -12,7 +12,7 @@ import numpy as np
 import mjsense
 from mjsense import _core
 from mjsense.compat.mjlab._data import Data
-from mjsense.compat.mjlab._tensors import HAS_TORCH, Cache, tensor
+from mjsense.compat.mjlab._tensors import HAS_TORCH, Cache, memory_of, tensor
 from mjsense.compat.mjlab.entity import Entity
 
 if TYPE_CHECKING:
@@ -49,6 +49,8 @@ class Sensor(Generic[T]):
     native: Any = None
     """The sensor of the native scene that computes this one."""
     _invalid = False
+    _kept: Any = None
+    """The object that ``data`` of a native sensor returned last, until the next update or reset."""
 
     def __init__(self) -> None:
         """A subclass need not call this constructor."""
@@ -104,20 +106,37 @@ class NativeSensor(Sensor[T]):
         self.cfg = cfg
         self.name = name or (cfg.prefixed_name if cfg is not None else "")
         self._tensors = Cache()
+        self._memory: list[Any] = []
 
     @property
     def data(self) -> T:
         """Tensors that share the sensor's memory. The first read after a change of state overwrites them."""
         if self.native is None:
             raise RuntimeError(f"sensor '{self.name}' has no data yet: it belongs to no scene")
-        return self._compute_data()
+        source = self.native.data
+        arrays = [source] if self._data_class is None else [getattr(source, name) for name in self._fields()]
+        memory = [memory_of(array) for array in arrays]
+        if self._kept is None or any(a is not b for a, b in zip(memory, self._memory)):
+            self._kept, self._memory = self._compute_data(), memory
+        return self._kept
+
+    def update(self, dt: float) -> None:
+        """The next ``data`` is another object. Its numbers never depend on this: they are always those of the current state."""
+        self._kept = None
+
+    def reset(self, env_ids: Any = None) -> None:
+        """The next ``data`` is another object."""
+        self._kept = None
+
+    def _fields(self) -> list[str]:
+        kind: Any = self._data_class
+        return [field.name for field in dataclasses.fields(kind)]
 
     def _compute_data(self) -> Any:
         data = self.native.data
         if self._data_class is None:
             return self._tensors("", data)
-        names = [field.name for field in dataclasses.fields(self._data_class)]
-        return self._data_class(**{name: self._tensors(name, getattr(data, name)) for name in names})
+        return self._data_class(**{name: self._tensors(name, getattr(data, name)) for name in self._fields()})
 
 
 class GivenSensor(Sensor[Any]):

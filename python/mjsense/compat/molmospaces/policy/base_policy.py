@@ -16,8 +16,13 @@ from mjsense.tasks.task import snake_case
 class BasePolicy:
     """A policy of one world. Implement ``get_action(observation)``, and ``reset()`` if the policy has a state."""
 
+    config: Any = None
     task: Any = None
-    """The task that it is registered with."""
+    """The task that it is registered with. Otherwise, while the policy is called, that of the world:
+    ``get_task_description()``, ``config`` and so on."""
+
+    def __init__(self, config: Any = None, task: Any = None) -> None:
+        self.config, self.task = config, task
 
     def reset(self) -> None:
         """Called at the start of an episode."""
@@ -51,14 +56,70 @@ class PlannerPolicy(BasePolicy):
         return [PolicyPhaseSensor(uuid="policy_phase"), PolicyNumRetriesSensor(uuid="policy_num_retries")]
 
 
-class PolicyOfWorlds(Policy):
-    """Runs a copy of a :class:`BasePolicy` in every world."""
+class InferencePolicy(BasePolicy):
+    """A policy with a model. Implement ``prepare_model``, ``obs_to_model_input``, ``inference_model`` and
+    ``model_output_to_action``."""
 
-    def __init__(self, first: BasePolicy) -> None:
+    def get_action(self, observation: dict[str, Any]) -> dict[str, Any] | None:
+        return self.model_output_to_action(self.inference_model(self.obs_to_model_input(observation)))
+
+    def prepare_model(self, *args: Any) -> None:
+        """Loads the model."""
+        raise NotImplementedError(f"{type(self).__name__}: write prepare_model()")
+
+    def obs_to_model_input(self, obs: dict[str, Any]) -> Any:
+        """What the model receives."""
+        raise NotImplementedError(f"{type(self).__name__}: write obs_to_model_input(obs)")
+
+    def inference_model(self, model_input: Any) -> Any:
+        """What the model returns."""
+        raise NotImplementedError(f"{type(self).__name__}: write inference_model(model_input)")
+
+    def model_output_to_action(self, model_output: Any) -> dict[str, Any]:
+        """Commands by move group."""
+        raise NotImplementedError(f"{type(self).__name__}: write model_output_to_action(model_output)")
+
+
+class StatefulPolicy(BasePolicy):
+    """A policy that all worlds share: its state of an episode is exchanged before a world's call."""
+
+    def get_state(self) -> Any:
+        """The state of an episode."""
+        raise NotImplementedError(f"{type(self).__name__}: write get_state()")
+
+    def set_state(self, state: Any) -> None:
+        """Continues the episode of this state."""
+        raise NotImplementedError(f"{type(self).__name__}: write set_state(state)")
+
+
+class _TaskOfWorld:
+    """The task, while the policy of one world is called. Other attributes are those that sensors see."""
+
+    def __init__(self, policy: Policy, world: int) -> None:
+        self._policy, self._world = policy, world
+
+    def get_task_description(self) -> str:
+        """The instruction of the episode."""
+        return self._policy.instructions[self._world]
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(f"the task has no '{name}'")
+        env = self._policy.sim.env
+        env.current_batch_index = self._world
+        return getattr(env.task, name)
+
+
+class PolicyOfWorlds(Policy):
+    """Runs a copy of a :class:`BasePolicy`, or of a policy of molmo_spaces, in every world. One with ``get_state`` and
+    ``set_state`` is not copied: all worlds share it."""
+
+    def __init__(self, first: Any) -> None:
         self.name = snake_case(type(first).__name__)
         self.first = first
         self.phases = dict(first.get_all_phases()) if isinstance(first, PlannerPolicy) else {}
-        self.instances: list[BasePolicy] = [first]
+        self.instances: list[Any] = [first]
+        self._is_shared = all(callable(getattr(first, name, None)) for name in ("get_state", "set_state"))
 
     def sensors(self) -> list[Any]:
         """The policy's sensors. Sensors of phases are mjsense's own."""
@@ -66,23 +127,31 @@ class PolicyOfWorlds(Policy):
         return [s for s in sensors if not (self.phases and isinstance(s, (PolicyPhaseSensor, PolicyNumRetriesSensor)))]
 
     def initialize(self) -> None:
-        memo = {id(self.first.task): self.first.task}
-        self.instances = [self.first] + [copy.deepcopy(self.first, dict(memo)) for _ in range(1, self.num_worlds)]
+        own = getattr(self.first, "task", None)
+        self._tasks = [_TaskOfWorld(self, world) if own is None else own for world in range(self.num_worlds)]
+        self._states: list[Any] = [None] * self.num_worlds
+        self.instances = [self.first] * self.num_worlds
+        if not self._is_shared:
+            self.instances[1:] = [copy.deepcopy(self.first, {id(own): own}) for _ in range(1, self.num_worlds)]
         task = self.sim.env.task
         if task is not None:
             task._policies = self.instances
 
     def reset(self, ids: np.ndarray) -> None:
-        for world in ids:
-            self.instances[world].reset()
-            self._note_phase(int(world))
+        for world in ids.tolist():
+            policy = self.instances[world]
+            policy.task = self._tasks[world]
+            policy.reset()
+            if self._is_shared:
+                self._states[world] = policy.get_state()
+            self._note_phase(world)
 
     def act(self, obs: dict[str, Any]) -> dict[str, np.ndarray]:
         done = np.zeros(self.num_worlds, bool)
         groups: dict[str, np.ndarray] = {}
-        for world in np.flatnonzero(self.wanted):
-            action = self.instances[world].get_action(_row(obs, int(world)))
-            self._note_phase(int(world))
+        for world in np.flatnonzero(self.wanted).tolist():
+            action = self._action(world, _row(obs, world))
+            self._note_phase(world)
             if action is None:
                 done[world] = True
                 continue
@@ -95,6 +164,16 @@ class PolicyOfWorlds(Policy):
                     groups.setdefault(name, np.full((self.num_worlds, values.size), np.nan))[world] = values
         self._hold(groups)
         return {**groups, "done": done}
+
+    def _action(self, world: int, observation: dict[str, Any]) -> dict[str, Any] | None:
+        policy = self.instances[world]
+        policy.task = self._tasks[world]
+        if not self._is_shared:
+            return policy.get_action(observation)
+        policy.set_state(self._states[world])
+        action = policy.get_action(observation)
+        self._states[world] = policy.get_state()
+        return action
 
     def _note_phase(self, world: int) -> None:
         policy = self.instances[world]

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-import mjsense
 from mjsense.compat.molmospaces.env.abstract_sensors import CoreSensor
 from mjsense.compat.molmospaces.env.sensors import RoleName
 from mjsense.compat.peer.config import PeerConfig, PeerTaskConfig
 from mjsense.sensors.nested_streams import nest, stream_path
 from mjsense.sensors.suite import SensorSuite
+from mjsense.sim.simulation import Simulation
+from mjsense.tasks.vector import TaskVectorEnv, make_vec
 
 
 class TaskConfig(PeerTaskConfig):
@@ -50,7 +51,7 @@ class BaseMujocoTask:
         self._options = options
         self._registered: Any = None
         self._sensor_suite: SensorSuite | None = None
-        self._worlds: mjsense.tasks.TaskVectorEnv | None = None
+        self._worlds: TaskVectorEnv | None = None
 
     def _create_sensor_suite_from_config(self, config: Any) -> SensorSuite:
         """The suite: usually ``get_core_sensors(config)`` and the task's own sensors."""
@@ -71,10 +72,10 @@ class BaseMujocoTask:
     # ------------------------------------------------------------------------------------------------- on its own
 
     @property
-    def worlds(self) -> mjsense.tasks.TaskVectorEnv:
+    def worlds(self) -> TaskVectorEnv:
         """The environment that runs the task."""
         if self._worlds is None:
-            self._worlds = mjsense.make_vec(self, autoreset_mode="disabled", **self._options)  # type: ignore[arg-type]
+            self._worlds = make_vec(self, autoreset_mode="disabled", **self._options)  # type: ignore[arg-type]
         return self._worlds
 
     @property
@@ -154,7 +155,7 @@ class BaseMujocoTask:
     def _mjs_uses_sensors(self) -> bool:
         return getattr(getattr(self.exp_config, "task_config", None), "use_sensors", True)
 
-    def _mjs_compose(self, sim: mjsense.Simulation) -> list[Any]:
+    def _mjs_compose(self, sim: Simulation) -> list[Any]:
         """The sensors of the suite that C++ does not have."""
         task = sim.env.task
         assert task is not None

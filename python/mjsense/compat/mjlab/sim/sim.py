@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import mujoco
+import numpy as np
 
 import mjsense
 from mjsense.compat.mjlab._data import Data
-from mjsense.compat.mjlab._tensors import ids
+from mjsense.compat.mjlab._tensors import ids, tensor
 from mjsense.compat.mjlab.scene import scene_of
 from mjsense.compat.mjlab.sensor.sensor_context import SensorContext
 from mjsense.sensors import configs
@@ -54,6 +56,17 @@ class SimulationCfg:
     nan_guard: Any = None
 
 
+class ExpandedModel:
+    """A model of which some fields have a row for each world."""
+
+    def __init__(self, model: Any, fields: dict[str, np.ndarray]) -> None:
+        self._model = model
+        vars(self).update({name: tensor(values) for name, values in fields.items()})
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._model, name)
+
+
 class Simulation:
     """``num_envs`` worlds of the scene of this model. ``native`` is the :class:`mjsense.Simulation`.
 
@@ -83,8 +96,9 @@ class Simulation:
         elif self.device != "cpu":
             raise ValueError(f"Simulation: device is '{device}': backend='cpu' is on the 'cpu'")
         self.native = mjsense.Simulation(self.scene.native, num_envs, **options)
-        self.scene._simulation = self.native
+        self.scene._begin(self.native)
         self._data = Data(self.native)
+        self._expanded: dict[str, tuple[np.ndarray, np.ndarray]] = {}
 
     @property
     def mj_model(self) -> mujoco.MjModel:
@@ -93,8 +107,29 @@ class Simulation:
 
     @property
     def model(self) -> Any:
-        """The model of the worlds: mujoco_warp's with ``backend="warp"``, otherwise ``mj_model``."""
-        return getattr(self.native, "warp_model", self.mj_model)
+        """The model of the worlds: mujoco_warp's with ``backend="warp"``; otherwise ``mj_model``, with the expanded fields."""
+        return getattr(self.native, "warp_model", self._model if self._expanded else self.mj_model)
+
+    def expand_model_fields(self, fields: Sequence[str]) -> None:
+        """These fields of ``model`` become tensors with a row for each world, which can be written; ``forward()`` applies them.
+
+        With ``backend="cpu"``. Afterwards, read ``model`` again.
+        """
+        if self.native.__class__ is not mjsense.Simulation:
+            raise NotImplementedError(
+                "expand_model_fields() is for backend='cpu': write the arrays of sim.model with backend='warp'"
+            )
+        for name in fields:
+            if name not in self._expanded:
+                values = np.array(self.native.model_field(name))
+                self._expanded[name] = values, values.copy()
+        self._model = ExpandedModel(self.mj_model, {name: now for name, (now, _) in self._expanded.items()})
+
+    def _apply_fields(self) -> None:
+        for name, (now, before) in self._expanded.items():
+            if not np.array_equal(now, before):
+                self.native.randomize(name, now)
+                before[...] = now
 
     @property
     def data(self) -> Data:
@@ -103,10 +138,12 @@ class Simulation:
 
     def step(self) -> None:
         """One physics step."""
+        self._apply_fields()
         self.native.step_raw(1)
 
     def forward(self) -> None:
         """Computes the derived quantities of the current state."""
+        self._apply_fields()
         self.native.forward()
 
     def set_sensor_context(self, ctx: SensorContext) -> None:
