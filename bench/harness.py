@@ -108,12 +108,13 @@ def median_seconds(*bodies: Callable[[], object], runs: int = 5, warmup: int = 1
 def machine() -> str:
     model, vectors = "unknown CPU", "vectors unknown"
     try:
-        with open("/proc/cpuinfo") as f:
-            said = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in f)}
-        model = said.get("model name", model)
-        flags = said.get("flags", "").split()
-        vectors = next((text for flag, text in (("avx512f", "AVX-512"), ("avx2", "AVX2")) if flag in flags), "SSE2")
-    except OSError:
+        text = subprocess.run(["lscpu"], capture_output=True, text=True, check=True, env={**os.environ, "LC_ALL": "C"}).stdout
+        said = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in text.splitlines())}
+        model = said.get("Model name", model)
+        flags = said.get("Flags", "").split()
+        known = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("sse2", "SSE2"), ("asimd", "NEON"))
+        vectors = next((text for flag, text in known if flag in flags), vectors)
+    except (OSError, subprocess.CalledProcessError):
         pass
     return f"{model}, {len(os.sched_getaffinity(0))} CPUs, {vectors}"
 

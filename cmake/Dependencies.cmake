@@ -36,12 +36,15 @@ if(NOT DEFLATE_FOUND)
   mjsense_missing("libdeflate not found: apt-get install libdeflate-dev")
 endif()
 
-# MuJoCo is taken from the wheel of the configuring Python, so that the C++ code and `import mujoco` use the same library.
+# MuJoCo is taken from the wheel of the configuring Python, so that the C++ code and `import mujoco` use the same library. A toolchain for
+# another CPU sets MUJOCO_DIR.
 mjsense_find(Python 3.11 COMPONENTS Interpreter)
-execute_process(
-  COMMAND ${Python_EXECUTABLE} -c
-          "import importlib.util as u; s = u.find_spec('mujoco'); print(s.submodule_search_locations[0] if s else '')"
-  OUTPUT_VARIABLE MUJOCO_DIR OUTPUT_STRIP_TRAILING_WHITESPACE)
+if(NOT CMAKE_CROSSCOMPILING)
+  execute_process(
+    COMMAND ${Python_EXECUTABLE} -c
+            "import importlib.util as u; s = u.find_spec('mujoco'); print(s.submodule_search_locations[0] if s else '')"
+    OUTPUT_VARIABLE MUJOCO_DIR OUTPUT_STRIP_TRAILING_WHITESPACE)
+endif()
 file(GLOB MUJOCO_LIBRARIES "${MUJOCO_DIR}/libmujoco.so.${MJSENSE_MUJOCO}.*")
 if(NOT MUJOCO_DIR OR NOT MUJOCO_LIBRARIES)
   mjsense_missing("MuJoCo ${MJSENSE_MUJOCO} not found in ${Python_EXECUTABLE}: run ./dev setup, or pip install \

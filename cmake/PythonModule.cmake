@@ -4,7 +4,7 @@
 find_package(Python 3.11 REQUIRED COMPONENTS Interpreter Development.Module)
 execute_process(COMMAND ${Python_EXECUTABLE} -m nanobind --cmake_dir OUTPUT_VARIABLE nanobind_ROOT
                 OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
-find_package(nanobind CONFIG REQUIRED)
+find_package(nanobind CONFIG REQUIRED NO_CMAKE_FIND_ROOT_PATH)
 
 file(GLOB_RECURSE MJSENSE_PY_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/python/bindings/*.cc)
 nanobind_add_module(mjsense_python BACKEND_MODULE nanobind_backend NOMINSIZE NB_SUPPRESS_WARNINGS ${MJSENSE_PY_SOURCES})
@@ -72,6 +72,9 @@ foreach(file IN LISTS MJSENSE_PY_FILES)
   file(CREATE_LINK ${PROJECT_SOURCE_DIR}/python/mjsense/${file} ${MJSENSE_PY_DIR}/${file} SYMBOLIC)
 endforeach()
 
+if(CMAKE_CROSSCOMPILING)
+  set(Python_EXECUTABLE ${CMAKE_SYSROOT}/emulated_python)  # imports the module
+endif()
 nanobind_add_stub(mjsense_stub MODULE mjsense._core OUTPUT ${MJSENSE_PY_DIR}/_core.pyi DEPENDS mjsense_python
                   PYTHON_PATH ${PROJECT_BINARY_DIR}/python)
 

@@ -2,6 +2,9 @@
 # Static libraries for the wheel, built by packaging/libraries.sh. Only the linker's input differs from other builds: headers, and
 # therefore object files, are the same.
 set(MJSENSE_STATIC_DIR ${PROJECT_SOURCE_DIR}/build/wheel/lib)
+if(CMAKE_CROSSCOMPILING)
+  set(MJSENSE_STATIC_DIR ${PROJECT_SOURCE_DIR}/build/wheel_${CMAKE_SYSTEM_PROCESSOR}/lib)
+endif()
 if(NOT EXISTS ${MJSENSE_STATIC_DIR}/libembree.a)
   message(FATAL_ERROR "MJSENSE_STATIC: no libraries in ${MJSENSE_STATIC_DIR}: run ./dev wheel")
 endif()
@@ -36,7 +39,7 @@ set(MJSENSE_STATIC_LINK -static-libstdc++ -L${MJSENSE_STATIC_DIR}/glibc -Wl,-rpa
 
 # The licenses of these libraries are added to the wheel.
 foreach(package fmt nlohmann-json3 tomlplusplus pcre2 embree ompl eigen3 boost hdf5 aec deflate xxhash zlib1g)
-  find_file(MJSENSE_LICENCE_${package} copyright PATHS /usr/share/doc/lib${package}-dev /usr/share/doc/${package}-dev
+  find_file(MJSENSE_LICENCE_${package} copyright PATHS ${CMAKE_SYSROOT}/usr/share/doc/lib${package}-dev ${CMAKE_SYSROOT}/usr/share/doc/${package}-dev
             NO_DEFAULT_PATH REQUIRED)
   if(SKBUILD)
     install(FILES ${MJSENSE_LICENCE_${package}} DESTINATION ${SKBUILD_METADATA_DIR}/licenses RENAME ${package} COMPONENT python)

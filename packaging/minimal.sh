@@ -1,23 +1,35 @@
 #!/usr/bin/env bash
 # Uses a wheel as a newcomer does on a Debian 12 that has Python and nothing else: no compiler, ffmpeg, OpenGL or network.
 # Debian's Python is 3.11; others are given by the folder they are installed in, which is copied. Root only; the first call makes the
-# Debian (debootstrap, 3 minutes). usage: packaging/minimal.sh WHEEL [PREFIX ...]
+# Debian (debootstrap, 3 minutes). A wheel for aarch64 is used under emulation, in the Debian of packaging/aarch64_sysroot.sh.
+# usage: packaging/minimal.sh WHEEL [PREFIX ...]
 set -euo pipefail
 wheel=$(realpath "$1")
 shift
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-root=$PWD/build/minimal
-[ -x "$root/usr/bin/python3" ] || debootstrap --variant=minbase --include=python3,python3-venv bookworm "$root" >/dev/null
+arch=${wheel##*manylinux_2_28_}
+arch=${arch%.whl}
+if [ "$arch" = "$(uname -m)" ]; then
+  root=$PWD/build/minimal
+  platform=()
+  [ -x "$root/usr/bin/python3" ] || debootstrap --variant=minbase --include=python3,python3-venv bookworm "$root" >/dev/null
+  inside() { unshare --mount bash -ec 'mount -t proc proc "$0/proc"; exec chroot "$0" "$@"' "$root" "$@"; }
+else
+  root=$PWD/build/${arch}_sysroot
+  platform=(--platform "manylinux_2_28_$arch" --platform "manylinux_2_17_$arch" --platform "manylinux2014_$arch")
+  "packaging/${arch}_sysroot.sh"
+  inside() { packaging/emulate.sh --inside "$@"; }
+fi
 
 try() { # VERSION PYTHON
   local wheels=$root/try/wheels-$1
   mkdir -p "$wheels"
-  .venv/bin/python -m pip download -q --disable-pip-version-check --only-binary=:all: --python-version "$1" -d "$wheels" "$wheel[video]" h5py
-  unshare --mount bash -ec "mount -t proc proc '$root/proc'
-    chroot '$root' $2 -m venv '/try/$1'
-    chroot '$root' '/try/$1/bin/python' -m pip install -q --no-index --find-links '/try/wheels-$1' 'mjsense[video]' h5py
-    chroot '$root' /try/newcomer.sh '/try/$1'
-    du -sh --apparent-size '$root/try/$1' | sed 's,/.*,with all it depends on,'"
+  .venv/bin/python -m pip download -q --disable-pip-version-check --only-binary=:all: --python-version "$1" "${platform[@]}" \
+    -d "$wheels" "$wheel[video]" h5py
+  inside "$2" -m venv "/try/$1"
+  inside "/try/$1/bin/python" -m pip install -q --no-index --find-links "/try/wheels-$1" 'mjsense[video]' h5py
+  inside /try/newcomer.sh "/try/$1"
+  du -sh --apparent-size "$root/try/$1" | sed 's,/.*,with all it depends on,'
 }
 
 rm -rf "$root/try"

@@ -392,16 +392,8 @@ constexpr struct {
 
 // CPU features by which the C library and Embree select their code.
 std::string cpu_level() {
-#if defined(__x86_64__)
-  __builtin_cpu_init();
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-      __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
-    return "avx512";
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return "avx2";
-  return "sse";
-#else
-  return "other";
-#endif
+  if (!kHasAvx) return "aarch64";
+  return best_isa() == Isa::kPortable ? "sse" : std::string(isa_name(best_isa()));
 }
 
 // "cpu kernels scene what" -> hash

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Vectors of kWidth floats for the kernels: AVX-512 (16 lanes), AVX2 (8), or plain arrays of 4 that
-// any compiler vectorises. All code is in an unnamed namespace, because each instruction set must
+// any compiler vectorises (SSE2, NEON). All code is in an unnamed namespace, because each instruction set must
 // keep its own copy. Highway is not used: three widths take 341 lines here and compile a fifth
 // faster, and bit-identical results on all instruction sets depend on the rounding of these
 // functions.
@@ -311,7 +311,11 @@ inline void gather_pairs(const std::uint32_t* p, Int i, Int& first, Int& second)
   }
 }
 inline Float rounded(Float a) {
+#if defined(__aarch64__)
+  __asm__("" : "+w"(a.v));
+#else
   __asm__("" : "+m"(a.v));
+#endif
   return a;
 }
 inline Float shifted(double by, Float a) {

@@ -35,10 +35,10 @@ KernelWorld kernel_world(const RayWorld& w) {
 }  // namespace
 
 const RayKernels& kernels_for(Isa isa) {
-#if defined(__x86_64__)
-  if (isa == Isa::kAvx512) return avx512_kernels();
-  if (isa == Isa::kAvx2) return avx2_kernels();
-#endif
+  if constexpr (kHasAvx) {
+    if (isa == Isa::kAvx512) return avx512_kernels();
+    if (isa == Isa::kAvx2) return avx2_kernels();
+  }
   return portable_kernels();
 }
 

@@ -9,16 +9,11 @@ namespace mjsense::record {
 namespace {
 
 Yuv420Kernel best_kernel() {
-  switch (cpu_isa()) {
-#if defined(__x86_64__)
-    case Isa::kAvx512:
-      return yuv420_avx512;
-    case Isa::kAvx2:
-      return yuv420_avx2;
-#endif
-    default:
-      return yuv420_portable;
+  if constexpr (kHasAvx) {
+    if (cpu_isa() == Isa::kAvx512) return yuv420_avx512;
+    if (cpu_isa() == Isa::kAvx2) return yuv420_avx2;
   }
+  return yuv420_portable;
 }
 
 }  // namespace

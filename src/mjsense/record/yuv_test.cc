@@ -108,10 +108,10 @@ TEST(Yuv, OddSizesRepeatTheirLastColumnAndRow) {
 
 TEST(Yuv, InstructionSetsAgree) {
   std::vector<Yuv420Kernel> kernels;
-#if defined(__x86_64__)
-  if (cpu_isa() >= Isa::kAvx2) kernels.push_back(yuv420_avx2);
-  if (cpu_isa() >= Isa::kAvx512) kernels.push_back(yuv420_avx512);
-#endif
+  if constexpr (kHasAvx) {
+    if (cpu_isa() >= Isa::kAvx2) kernels.push_back(yuv420_avx2);
+    if (cpu_isa() >= Isa::kAvx512) kernels.push_back(yuv420_avx512);
+  }
   for (const auto& [width, height] : {std::pair(640, 48), std::pair(61, 9), std::pair(2, 4)}) {
     const Bytes rgb = picture(width, height);
     std::vector<std::int16_t> scratch(yuv420_scratch(width));

@@ -205,10 +205,10 @@ TEST(Kernels, EveryInstructionSetRendersTheSameImage) {
   };
   const auto portable = shoot(render_tiles_portable);
   std::vector<RenderTiles> others;
-#if defined(__x86_64__)
-  if (cpu_isa() >= Isa::kAvx2) others.push_back(render_tiles_avx2);
-  if (cpu_isa() >= Isa::kAvx512) others.push_back(render_tiles_avx512);
-#endif
+  if constexpr (kHasAvx) {
+    if (cpu_isa() >= Isa::kAvx2) others.push_back(render_tiles_avx2);
+    if (cpu_isa() >= Isa::kAvx512) others.push_back(render_tiles_avx512);
+  }
   for (RenderTiles render : others) {
     const auto image = shoot(render);
     int different = 0;

@@ -105,10 +105,10 @@ TEST(Shadow, AgreesWithMuJoCosRays) {
   constexpr int kSize = 40;
   int compared[2] = {};
   std::vector<RenderTiles> kernels{render_tiles_portable};
-#if defined(__x86_64__)
-  if (cpu_isa() >= Isa::kAvx2) kernels.push_back(render_tiles_avx2);
-  if (cpu_isa() >= Isa::kAvx512) kernels.push_back(render_tiles_avx512);
-#endif
+  if constexpr (kHasAvx) {
+    if (cpu_isa() >= Isa::kAvx2) kernels.push_back(render_tiles_avx2);
+    if (cpu_isa() >= Isa::kAvx512) kernels.push_back(render_tiles_avx512);
+  }
   for (const char* light : {"type='directional'", "type='spot' cutoff='40' exponent='0'",
                             "type='spot' cutoff='80' exponent='0'", "type='point'"}) {
     for (unsigned seed = 0; seed < 24; ++seed) {

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -15,6 +14,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/system/thread_pool.h"
 #include "mjsense/core/testing/error_of.h"
+#include "mjsense/core/testing/memory_limit.h"
 #include "mjsense/core/testing/temp_dir.h"
 
 namespace mjsense {
@@ -139,23 +139,15 @@ TEST(PlainFile, PrintableText) {
 // If the system refuses to start threads, that is an error. Threads that were started are ended.
 TEST(ThreadPool, FailureToStartThreadsThrows) {
   EXPECT_THROW(ThreadPool(1'000'000), ValueError);
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  const pid_t pid = fork();
-  if (pid == 0) {
+  testing::with_address_space(rlim_t{3} << 30, [] {  // each thread reserves 8 MiB of it
     alarm(20);
-    const rlimit limit{std::uint64_t{3} << 30, std::uint64_t{3} << 30};
-    setrlimit(RLIMIT_AS, &limit);  // each thread reserves 8 MiB of it
     try {
       const ThreadPool pool(4000);
-      _exit(2);
+      FAIL() << "4000 threads in 3 GiB";
     } catch (const RuntimeError& e) {
-      _exit(std::string(e.what()).find("use fewer threads") != std::string::npos ? 0 : 3);
+      EXPECT_NE(std::string(e.what()).find("use fewer threads"), std::string::npos) << e.what();
     }
-  }
-  int status = 0;
-  waitpid(pid, &status, 0);
-  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0) << status;
-#endif
+  });
 }
 
 // In the child of a fork the threads do not exist. The destructor must not wait for them.

@@ -4,9 +4,14 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <bit>
 #include <cstdlib>
 
 #include "mjsense/core/error.h"
+
+// Files and arrays are read and written as they are in memory. mujoco_call.cc has assembly code.
+static_assert(std::endian::native == std::endian::little && sizeof(void*) == 8,
+              "mjsense supports little-endian 64-bit CPUs: x86-64 and AArch64");
 
 namespace mjsense {
 namespace {
@@ -29,7 +34,7 @@ Isa detect() {
 }
 
 Isa choose() {
-  const Isa best = detect();
+  const Isa best = best_isa();
   const char* wanted = std::getenv("MJSENSE_ISA");
   if (wanted == nullptr || *wanted == '\0') return best;
   for (std::size_t i = 0; i < kNames.size(); ++i) {
@@ -43,6 +48,11 @@ Isa choose() {
 }
 
 }  // namespace
+
+Isa best_isa() {
+  static const Isa isa = detect();
+  return isa;
+}
 
 Isa cpu_isa() {
   static const Isa isa = choose();

@@ -9,6 +9,7 @@
 #include <new>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/system/cpu.h"
 #include "mjsense/core/system/os.h"
 #include "mjsense/core/system/process_state.h"
 
@@ -28,9 +29,7 @@ void spin(const Ready& ready) {
   do {
     for (int i = 0; i < 16; ++i) {
       if (ready()) return;
-#if defined(__x86_64__)
-      __builtin_ia32_pause();
-#endif
+      spin_pause();
     }
     sched_yield();
   } while (std::chrono::steady_clock::now() < end);

@@ -11,16 +11,11 @@ struct Kernels {
 };
 
 Kernels best_kernels() {
-  switch (cpu_isa()) {
-#if defined(__x86_64__)
-    case Isa::kAvx512:
-      return {render_tiles_avx512, may_show_avx512};
-    case Isa::kAvx2:
-      return {render_tiles_avx2, may_show_avx2};
-#endif
-    default:
-      return {render_tiles_portable, may_show_portable};
+  if constexpr (kHasAvx) {
+    if (cpu_isa() == Isa::kAvx512) return {render_tiles_avx512, may_show_avx512};
+    if (cpu_isa() == Isa::kAvx2) return {render_tiles_avx2, may_show_avx2};
   }
+  return {render_tiles_portable, may_show_portable};
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "mjsense/core/content_cache.h"
+#include "mjsense/core/system/cpu.h"
 
 namespace mjsense::render {
 namespace {
@@ -40,18 +41,10 @@ Interpolation interpolation_at(int i, int fine, int coarse) {
   return {first, std::min(first + 1, fine - 1), x - static_cast<float>(first)};
 }
 
-// Functions that go over all texels are compiled for wide vectors too. Without fused operations, so
-// that the results are the same.
-#ifdef __x86_64__
-#define MJSENSE_VECTORS [[gnu::target_clones("avx2", "default")]]
-#else
-#define MJSENSE_VECTORS
-#endif
-
 // A row of the coarser level with half the width: each texel is the rounded mean
 // (a + b + c + d + 2) / 4 of 2 x 2 texels of two rows of the finer level.
-MJSENSE_VECTORS void average_2x2(const std::uint32_t* above, const std::uint32_t* below, int count,
-                                 std::uint32_t* out) {
+MJSENSE_WIDE_TOO void average_2x2(const std::uint32_t* above, const std::uint32_t* below, int count,
+                                  std::uint32_t* out) {
   // A pair as four sums of 16 bits: red and blue, then green and alpha.
   constexpr std::uint64_t kChannels = 0x00ff00ff00ff00ff;
   constexpr std::uint32_t kHalf = 0x00020002;  // rounds the division by four
@@ -81,9 +74,9 @@ MJSENSE_VECTORS void average_2x2(const std::uint32_t* above, const std::uint32_t
 
 // A row of the coarser level by bilinear interpolation: between two rows of the finer level, where
 // `below` has the weight v, and between their columns.
-MJSENSE_VECTORS void interpolate_row(const std::uint32_t* above, const std::uint32_t* below,
-                                     float v, std::span<const Interpolation> columns,
-                                     std::uint32_t* out) {
+MJSENSE_WIDE_TOO void interpolate_row(const std::uint32_t* above, const std::uint32_t* below,
+                                      float v, std::span<const Interpolation> columns,
+                                      std::uint32_t* out) {
   using Channels [[gnu::vector_size(16)]] = float;
   using Words [[gnu::vector_size(16)]] = std::int32_t;
   constexpr Words kShifts = {0, 8, 16, 24};
@@ -105,7 +98,7 @@ MJSENSE_VECTORS void interpolate_row(const std::uint32_t* above, const std::uint
 }
 
 // Texels of three bytes to opaque texels of four.
-MJSENSE_VECTORS void opaque_row(const mjtByte* from, int count, std::uint32_t* out) {
+MJSENSE_WIDE_TOO void opaque_row(const mjtByte* from, int count, std::uint32_t* out) {
   using Bytes [[gnu::vector_size(16)]] = std::uint8_t;
   using Texels [[gnu::vector_size(16)]] = std::uint32_t;
   int x = 0;

@@ -34,8 +34,10 @@ scene::ModelSource make_dining(GeneratorInput& input, SceneFileCfg& cfg) {
   const Gloss satin{.specular = 0.2, .shininess = 0.4, .roughness = 0.45};
   room.tiled("table", boards_picture(wood, 8, rng.next()), 1.0, satin);
   room.wrapped("table_edge", wood_picture(brighter(wood, 0.85), rng.next()), satin);
-  room.wrapped("chair", wood_picture(wood_colour(rng), rng.next()), satin);
-  room.tiled("rug", cloth_picture(pick(rng, kRugs), rng.next()), 0.5);
+  const auto seat = rng.next();
+  room.wrapped("chair", wood_picture(wood_colour(rng), seat), satin);
+  const auto rug = rng.next();
+  room.tiled("rug", cloth_picture(pick(rng, kRugs), rug), 0.5);
   room.plain("frame", pick(rng, kFrames), satin);
   write_picture(room, "picture", rng);
 

@@ -246,9 +246,11 @@ scene::ModelSource make_floor(GeneratorInput& input, SceneFileCfg& cfg) {
   write_furniture_materials(out, rng);
   for (int i = 0; i < 3; ++i) write_picture(out, fmt::format("painting_{}", i), rng);
   const Gloss polished{.specular = 0.15, .shininess = 0.3, .reflectance = 0.02, .roughness = 0.5};
-  for (int i = 0; i < 3; ++i)
+  for (int i = 0; i < 3; ++i) {
+    const auto planks = rng.next();
     out.tiled(fmt::format("floor_{}", i),
-              planks_picture(brighter(wood_colour(rng), 0.85), 8, rng.next()), 1.2, polished);
+              planks_picture(brighter(wood_colour(rng), 0.85), 8, planks), 1.2, polished);
+  }
   out.tiled("floor_3", tiles_picture({0.70, 0.68, 0.64}, {0.52, 0.51, 0.49}, 3, false, rng.next()),
             1.2, polished);
 

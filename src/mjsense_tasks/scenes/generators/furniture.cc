@@ -282,8 +282,9 @@ void write_dining_table(RoomWriter& out, const std::string& name, int chairs, Rn
     const double side = i % 2 == 0 ? 1 : -1;
     const int row = i / 2;
     const double x = (row - 0.25 * (chairs - 2)) * 0.60;
-    RoomWriter::Local seat(out, "", {x, side * (half_y + 0.22 + rng.uniform(-0.06, 0.06)), 0},
-                           (side > 0 ? 0 : pi) + rng.uniform(-0.12, 0.12));
+    const double yaw = (side > 0 ? 0 : pi) + rng.uniform(-0.12, 0.12);
+    const double y = side * (half_y + 0.22 + rng.uniform(-0.06, 0.06));
+    RoomWriter::Local seat(out, "", {x, y, 0}, yaw);
     chair(out, rng);
   }
 }
@@ -313,9 +314,11 @@ void write_furniture_materials(RoomWriter& out, Rng& rng) {
   out.plain("dark_wood", brighter(wood, 0.55), polished);
   out.plain("white_wood", around({0.86, 0.85, 0.82}), polished);
   const auto first = rng.below(8);
-  for (std::uint32_t i = 0; i < 3; ++i)
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    const auto threads = rng.next();
     out.wrapped(fmt::format("cloth_{}", i + 1),
-                cloth_picture(around(kCloths[(first + 3 * i) % 8]), rng.next()), matt);
+                cloth_picture(around(kCloths[(first + 3 * i) % 8]), threads), matt);
+  }
   out.plain("sheet", around({0.90, 0.89, 0.86}), matt);
   for (int i = 0; i < 5; ++i) out.plain(fmt::format("book_{}", i), around(kBooks[i]));
   out.plain("steel", {0.60, 0.61, 0.63},

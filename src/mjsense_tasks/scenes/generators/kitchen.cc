@@ -28,25 +28,27 @@ struct Placed {
 void materials(RoomWriter& room, Rng& rng) {
   write_shell_finishes(room, rng);
   const Gloss satin{.specular = 0.2, .shininess = 0.4, .roughness = 0.45};
-  if (rng.below(2) == 0) {
-    room.wrapped("front", wood_picture(wood_colour(rng), rng.next()), satin);
-  } else {
-    room.wrapped("front", plaster_picture(paint_colour(rng), rng.next()), satin);
-  }
+  const bool of_wood = rng.below(2) == 0;
+  const auto front = rng.next();
+  room.wrapped(
+      "front",
+      of_wood ? wood_picture(wood_colour(rng), front) : plaster_picture(paint_colour(rng), front),
+      satin);
   room.plain("carcass", {0.86, 0.86, 0.84}, {.specular = 0.1, .shininess = 0.3});
   room.wrapped("inside", wood_picture({0.80, 0.70, 0.56}, rng.next()));
   room.plain("plinth", {0.18, 0.18, 0.19});
-  if (rng.below(3) > 0) {
-    room.tiled("worktop", stone_picture(pick(rng, kStones), rng.next()), 0.6,
+  const bool of_stone = rng.below(3) > 0;
+  const auto worktop = rng.next();
+  if (of_stone) {
+    room.tiled("worktop", stone_picture(pick(rng, kStones), worktop), 0.6,
                {.specular = 0.4, .shininess = 0.6, .reflectance = 0.04, .roughness = 0.25});
   } else {
-    room.tiled("worktop", planks_picture(wood_colour(rng), 10, rng.next()), 0.8, satin);
+    room.tiled("worktop", planks_picture(wood_colour(rng), 10, worktop), 0.8, satin);
   }
-  const Colour splash = pick(rng, kSplash);
-  room.tiled(
-      "splash",
-      tiles_picture(splash, mix(splash, {0.75, 0.74, 0.72}, 0.7), 4, rng.below(2) == 0, rng.next()),
-      0.6, {.specular = 0.4, .shininess = 0.6, .roughness = 0.2});
+  const Colour splash = pick(rng, kSplash), joint = mix(splash, {0.75, 0.74, 0.72}, 0.7);
+  const auto tiles = rng.next();
+  room.tiled("splash", tiles_picture(splash, joint, 4, rng.below(2) == 0, tiles), 0.6,
+             {.specular = 0.4, .shininess = 0.6, .roughness = 0.2});
   room.wrapped("steel", brushed_picture({0.66, 0.67, 0.68}, rng.next()),
                {.specular = 0.6, .shininess = 0.6, .metallic = 1, .roughness = 0.35});
   const Colour metals[] = {{0.70, 0.71, 0.72}, {0.16, 0.16, 0.17}, {0.66, 0.54, 0.34}};

@@ -56,21 +56,21 @@ void write_door_materials(RoomWriter& out, Rng& rng) {
                                 {0.66, 0.48, 0.32}};
   write_shell_finishes(out, rng);
   write_furniture_materials(out, rng);
-  out.plain("door_paint", brighter(pick(rng, kPaints), rng.uniform(0.95, 1.05)),
+  const double brightness = rng.uniform(0.95, 1.05);
+  out.plain("door_paint", brighter(pick(rng, kPaints), brightness),
             {.specular = 0.2, .shininess = 0.35, .roughness = 0.45});
   out.plain("door_metal", rng.below(3) == 0 ? Colour{0.72, 0.60, 0.38} : Colour{0.62, 0.63, 0.65},
             {.specular = 0.8, .shininess = 0.7, .metallic = 1, .roughness = 0.35});
   const Gloss polished{.specular = 0.15, .shininess = 0.3, .reflectance = 0.03, .roughness = 0.5};
-  out.tiled("floor_front", planks_picture(brighter(wood_colour(rng), 0.85), 8, rng.next()), 1.2,
+  const auto front = rng.next();
+  out.tiled("floor_front", planks_picture(brighter(wood_colour(rng), 0.85), 8, front), 1.2,
             polished);
-  if (rng.below(2) == 0) {
-    out.tiled("floor_back",
-              tiles_picture({0.72, 0.70, 0.66}, {0.52, 0.51, 0.49}, 3, false, rng.next()), 1.2,
-              polished);
-  } else {
-    out.tiled("floor_back", planks_picture(brighter(wood_colour(rng), 0.8), 8, rng.next()), 1.2,
-              polished);
-  }
+  const bool tiles = rng.below(2) == 0;
+  const auto back = rng.next();
+  out.tiled("floor_back",
+            tiles ? tiles_picture({0.72, 0.70, 0.66}, {0.52, 0.51, 0.49}, 3, false, back)
+                  : planks_picture(brighter(wood_colour(rng), 0.8), 8, back),
+            1.2, polished);
   for (const char* name : {"painting_1", "painting_2"}) write_picture(out, name, rng);
 }
 

@@ -24,12 +24,21 @@ Colour pick(Rng& rng, std::span<const Colour> colours) {
   return colours[rng.below(static_cast<std::uint32_t>(colours.size()))];
 }
 
-Colour wood_colour(Rng& rng) { return brighter(pick(rng, kWoods), rng.uniform(0.9, 1.1)); }
-Colour paint_colour(Rng& rng) { return brighter(pick(rng, kPaints), rng.uniform(0.92, 1.06)); }
+// The compiler chooses the order in which arguments are evaluated, and compilers for different CPUs
+// choose differently: each statement draws one random number, here and in the generators.
+Colour wood_colour(Rng& rng) {
+  const double brightness = rng.uniform(0.9, 1.1);
+  return brighter(pick(rng, kWoods), brightness);
+}
+Colour paint_colour(Rng& rng) {
+  const double brightness = rng.uniform(0.92, 1.06);
+  return brighter(pick(rng, kPaints), brightness);
+}
 
 void write_shell_finishes(RoomWriter& room, Rng& rng) {
   if (rng.below(3) > 0) {
-    room.tiled("floor", planks_picture(brighter(wood_colour(rng), 0.85), 8, rng.next()), 1.2,
+    const auto planks = rng.next();
+    room.tiled("floor", planks_picture(brighter(wood_colour(rng), 0.85), 8, planks), 1.2,
                {.specular = 0.15, .shininess = 0.3, .reflectance = 0.04, .roughness = 0.5});
   } else {
     const Colour tile = pick(rng, kTiles);

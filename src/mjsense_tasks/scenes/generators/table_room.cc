@@ -70,8 +70,9 @@ scene::ModelSource make_table_room(GeneratorInput& input, SceneFileCfg&) {
   const double sideboard = rng.uniform(-0.7, 0.3);
   stand(Furniture::kSideboard, "sideboard", shell.x1, sideboard, -0.5 * pi);
   stand(Furniture::kPlant, "plant", shell.x1 - 0.35, shell.y0 + 0.25, pi);
-  stand(rng.below(2) == 0 ? Furniture::kBookcase : Furniture::kArmchair, "by_the_wall",
-        rng.uniform(0.7, 1.2), shell.y0, pi);
+  const double along = rng.uniform(0.7, 1.2);
+  stand(rng.below(2) == 0 ? Furniture::kBookcase : Furniture::kArmchair, "by_the_wall", along,
+        shell.y0, pi);
   {
     RoomWriter::Local wall(room, "", {shell.x1, sideboard, 0}, -0.5 * pi);
     write_painting(room, "painting", 0.85, 0.57, 1.6);
