@@ -296,7 +296,8 @@ def test_entities_are_written_and_read_as_in_mjlab():
     state[:, 3:7] /= np.linalg.norm(state[:, 3:7], axis=1)[:, None]
     joints, speeds = rng.uniform(-1, 1, (2, 2)), rng.uniform(-1, 1, (2, 2))
     worlds = [0, 2]
-    model, plain = sim.mj_model, mujoco.MjData(sim.mj_model)
+    model = mujoco.MjModel.from_xml_string(scene.native.to_xml())
+    plain = mujoco.MjData(model)
     body, found = model.body("arm/base").id, np.zeros(6)
 
     def velocity(world, kind, local):

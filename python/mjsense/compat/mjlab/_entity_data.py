@@ -16,7 +16,7 @@ _FREE = 0  # mjJNT_FREE
 
 def _like(values: Any, target: Any) -> Any:
     """``values`` as the kind of array that ``target`` is, with its dtype."""
-    given = values.detach() if hasattr(values, "detach") else np.asarray(values)
+    given: Any = values.detach() if hasattr(values, "detach") else np.asarray(values)
     if isinstance(target, np.ndarray):
         return np.asarray(given.cpu() if hasattr(given, "cpu") else given, target.dtype)
     return (tensor(given) if isinstance(given, np.ndarray) else given).to(target.device, target.dtype)

@@ -85,7 +85,9 @@ void CameraResponse::expose(State& state, double time, const float* radiance) co
     state.exposure = exposure_;
     return;
   }
-  // A world may be changed without a step: then its image replaces the one of the same time.
+  // A world may be changed without a step: then its image replaces the one of the same time. An earlier
+  // state is a new beginning, as a reset is.
+  if (time < state.time) state.images = 0;
   if (state.images == 0 || time > state.time) {
     state.earlier_exposure = state.exposure;
     state.earlier_time = state.time;

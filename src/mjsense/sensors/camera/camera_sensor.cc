@@ -305,7 +305,7 @@ void CameraSensor::compute(const World& world) {
   if (optical_flow_) optical_flow_->take(world, w.grid);
   w.rng = world.rng(stream_of(name()));
   w.colour_rng = world.rng(stream_of(name() + "/rgb"));
-  w.time = world.time();
+  w.time = world.data->time;  // of the state, which a recording keeps
   std::ranges::copy(render::intrinsic_matrix(w.grid),
                     intrinsics_->data.row<float>(world.id).begin());
   const double* p = world.data->cam_xpos + 3 * camera_;

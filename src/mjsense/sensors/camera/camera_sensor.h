@@ -57,7 +57,7 @@ class CameraSensor final : public Sensor {
     bool due = false;
     Rng rng{0, 0, 0, 0};  // at the time of the image
     Rng colour_rng{0, 0, 0, 0};
-    double time = 0;  // s, since the reset
+    double time = 0;  // s, of the state
   };
   std::string context() const;  // for errors: "camera 'NAME'"
   bool wants(std::string_view type) const;
