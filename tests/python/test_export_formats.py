@@ -94,6 +94,16 @@ def test_model_xml_names_a_field_that_mjcf_cannot_express(root, monkeypatch):
         model_xml(episode)
 
 
+def test_model_xml_names_the_fields_of_a_model_that_mujoco_does_not_compile(root, monkeypatch):
+    episode = mjs.Dataset(root).episodes[0]
+    model = episode.model()
+    model.geom_size[np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_BOX)[-1]] = 0
+    monkeypatch.setattr("mjsense.dataset.playback.model_of", lambda _: model)
+    monkeypatch.setattr("mjsense.dataset.playback.changed_fields", lambda _: ["geom_size"])
+    with pytest.raises(ValueError, match=r"traj_0\): MJCF cannot express its geom_size: Error: size 0 must be positive in geom"):
+        model_xml(episode)
+
+
 # robomimic
 
 

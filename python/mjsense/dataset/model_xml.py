@@ -114,7 +114,7 @@ def model_xml(episode: Episode) -> tuple[str, dict[str, bytes]]:
         compiled = mujoco.MjModel.from_xml_string(result, assets)
     except ValueError as error:
         raise ValueError(
-            f"{playback.where(episode)}: MuJoCo does not compile its model: {' '.join(str(error).split())}"
+            f"{playback.where(episode)}: MJCF cannot express its {', '.join(changed)}: {' '.join(str(error).split())}"
         ) from error
     if wrong := [
         field for field in changed if not np.allclose(field_of(compiled, field), field_of(model, field), rtol=1e-5, atol=1e-8)
