@@ -115,6 +115,7 @@ def test_no_file_outside_of_the_archive_is_read(tmp_path):
         (dict(asset="<mesh name='m' content_type='model/usd' file='a.obj'/>", members={"a.obj": OBJ}), "content_type 'model/usd'"),
         (dict(body="<plugin plugin='evil.plugin'/>"), "not one of MuJoCo's own"),
         (dict(body="<geom size='.1' class='%s%n'/>"), "a format of printf"),
+        (dict(body="<geom size='.1 -NaN'/>"), "size of 'geom' is '.1 -NaN', expected finite numbers"),
         (dict(text="<robot name='x'/>"), "expected 'mujoco'"),
         (dict(text="<a>" * 500 + "</a>" * 500), "nested elements"),
     ]
@@ -122,6 +123,11 @@ def test_no_file_outside_of_the_archive_is_read(tmp_path):
         with pytest.raises(ValueError, match=why) as error:
             closed(**given)
         assert str(error.value).startswith("a.zip: model.xml: ") and "\n" not in str(error.value)
+
+
+def test_nan_may_be_a_name():
+    text = closed(body="<body name='nan'><geom size='.1'/></body><site name='s'/><camera name='c' mode='targetbody' target='nan'/>")
+    assert mujoco.MjModel.from_xml_string(text).body("nan").name == "nan"
 
 
 def test_folders_of_the_compiler(tmp_path):

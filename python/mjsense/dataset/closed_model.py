@@ -94,7 +94,19 @@ def parsed(text: str | bytes, about: str) -> Element:
     root = builder.close()
     if root.tag != "mujoco":
         raise ValueError(f"{about}: the root element is '{root.tag[:40]}', expected 'mujoco'")
+    _check_numbers(root, about)
     return root
+
+
+def _check_numbers(root: Element, about: str) -> None:
+    """Raises ValueError for NaN, which MuJoCo only warns of."""
+    names = {element.get(key) for element in root.iter() for key in ("name", "class")}
+    for element in root.iter():
+        for key, value in element.items():
+            if "nan" not in value.lower() or value in names or element.tag == "text":
+                continue
+            if any(word.lower().lstrip("+-") == "nan" for word in value.split()):
+                raise ValueError(f"{about}: {key[:40]} of '{element.tag[:40]}' is {value[:60]!r}, expected finite numbers")
 
 
 def close_names(root: Element, find: Callable[[Element, str, str, str], str], about: str) -> None:
