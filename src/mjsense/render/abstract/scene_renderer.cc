@@ -318,8 +318,9 @@ void SceneRenderer::add(const AbstractGeom& geom, const SceneMemory& scene, bool
   drawn_.push_back(out);
 }
 
-void SceneRenderer::add_triangles(DrawnGeom drawn, ShapeTriangles triangles) {
+void SceneRenderer::add_triangles(const DrawnGeom& like, ShapeTriangles triangles) {
   if (triangles.faces.empty()) return;
+  DrawnGeom drawn = like;
   Decoration& d = *decorations_.emplace_back(std::make_unique<Decoration>());
   d.triangles = std::move(triangles);
   d.scene = rays::build_triangles(device_.get(), d.triangles.vertices, d.triangles.faces,
@@ -336,7 +337,8 @@ void SceneRenderer::add_triangles(DrawnGeom drawn, ShapeTriangles triangles) {
 
 // Lines are not lit. Their triangles have no normal, so that only the lights' ambient parts reach
 // them; emission makes up for the rest of the colour.
-void SceneRenderer::add_lines(const AbstractGeom& geom, DrawnGeom drawn) {
+void SceneRenderer::add_lines(const AbstractGeom& geom, const DrawnGeom& like) {
+  DrawnGeom drawn = like;
   const double* r = drawn.shape.mat;
   float eye[3], ahead[3];
   for (int i = 0; i < 3; ++i) {
@@ -372,7 +374,9 @@ void SceneRenderer::add_lines(const AbstractGeom& geom, DrawnGeom drawn) {
   add_triangles(drawn, std::move(out));
 }
 
-void SceneRenderer::add_flex(const AbstractGeom& geom, DrawnGeom drawn, const SceneMemory& scene) {
+void SceneRenderer::add_flex(const AbstractGeom& geom, const DrawnGeom& like,
+                             const SceneMemory& scene) {
+  DrawnGeom drawn = like;
   const int id = geom.objid;
   if (id < 0 || id >= soft_.num_flexes) return;
   const int used = soft_.flexfaceused[id];
@@ -461,7 +465,8 @@ void SceneRenderer::add_flex(const AbstractGeom& geom, DrawnGeom drawn, const Sc
   drawn_.push_back(drawn);
 }
 
-void SceneRenderer::add_skin(const AbstractGeom& geom, DrawnGeom drawn) {
+void SceneRenderer::add_skin(const AbstractGeom& geom, const DrawnGeom& like) {
+  DrawnGeom drawn = like;
   const int id = geom.objid;
   if (id < 0 || id >= model_->nskin || model_->skin_facenum[id] == 0) return;
   const std::span<const float> now(soft_.skinvert + 3 * soft_.skinvertadr[id],

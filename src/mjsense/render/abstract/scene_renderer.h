@@ -90,10 +90,10 @@ class SceneRenderer {
 
   void read(const SceneMemory& scene, bool all);
   void add(const AbstractGeom& geom, const SceneMemory& scene, bool colored);
-  void add_triangles(DrawnGeom drawn, ShapeTriangles triangles);
-  void add_lines(const AbstractGeom& geom, DrawnGeom drawn);
-  void add_flex(const AbstractGeom& geom, DrawnGeom drawn, const SceneMemory& scene);
-  void add_skin(const AbstractGeom& geom, DrawnGeom drawn);
+  void add_triangles(const DrawnGeom& like, ShapeTriangles triangles);
+  void add_lines(const AbstractGeom& geom, const DrawnGeom& like);
+  void add_flex(const AbstractGeom& geom, const DrawnGeom& like, const SceneMemory& scene);
+  void add_skin(const AbstractGeom& geom, const DrawnGeom& like);
   void read_lights(const SceneMemory& scene);
   void read_camera(const SceneMemory& scene, int width, int height);
   void trace_paths(const View& view, std::uint8_t* rgb);
