@@ -5,9 +5,9 @@ consist of.
     build/mjlab/bin/python bench/mjlab_cpu.py [TASK ...] [--envs 64 1024] [--steps 20] [--threads 1]
 
 One process has both environments. After `--warm` steps with mjsense's physics, which bring both into the same states, each takes
-the same random actions. CPU time is that of all threads. Physics: step, forward,
-reset and set_const; sensing: rays and cameras; the rest: managers, contact sensors, rewards, observations. The environment
-build/mjlab is that of tests/python/test_adapters.py; PYTHONPATH names the folder of the build, build/release/python.
+the same random actions. CPU time is that of all threads. Physics: step, forward, reset and set_const; sensing: rays and cameras;
+the rest: managers, contact sensors, rewards, observations. The environment build/mjlab is that of tests/python/test_adapters.py;
+PYTHONPATH names the folder of the build, build/release/python.
 """
 
 from __future__ import annotations

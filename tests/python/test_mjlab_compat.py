@@ -339,6 +339,21 @@ def test_entities_are_written_and_read_as_in_mjlab():
         _ = arm.data.heading_w
 
 
+def test_velocities_of_an_entity_with_two_trees_of_bodies():
+    text = ARM.replace("</worldbody>", "<body name='lever' pos='0 2 0'><joint name='lever' axis='1 0 0'/><geom size='.1' pos='0 .4 0'/></body></worldbody>")
+    scene = Scene(SceneCfg(num_envs=1, entities={"arm": EntityCfg(spec_fn=lambda: mujoco.MjSpec.from_string(text))}))
+    sim = Simulation(1, SimulationCfg(), scene.compile())
+    model = mujoco.MjModel.from_xml_string(scene.native.to_xml())
+    plain, found = mujoco.MjData(model), np.zeros(6)
+    plain.qvel[:] = np.random.default_rng(0).normal(size=model.nv)
+    mujoco.mj_forward(model, plain)
+    sim.data.qvel[:] = like_tensor(plain.qvel[None])
+    sim.forward()
+    for i, name in enumerate(("base", "link", "lever")):
+        mujoco.mj_objectVelocity(model, plain, mujoco.mjtObj.mjOBJ_XBODY, model.body(f"arm/{name}").id, found, 0)
+        np.testing.assert_allclose(array(scene["arm"].data.body_link_vel_w)[0, i], [*found[3:], *found[:3]], atol=1e-5)
+
+
 def test_expanded_fields_of_the_model_are_applied_by_forward():
     _, sim = two_entities()
     mass = sim.mj_model.body_mass.copy()

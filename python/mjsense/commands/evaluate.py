@@ -73,8 +73,8 @@ def add_arguments(parser: Parser) -> None:
         "--ensemble",
         type=float,
         metavar="FLOAT",
-        help="Execute the mean of all chunks that have an action for the step, with the weights exp(-FLOAT * i), i "
-        "= 0 for the oldest.",
+        help="Execute the mean of all chunks that have an action for the step, with the weights "
+        "exp(-FLOAT * i), i = 0 for the oldest.",
     )
     parser.add_argument(
         "--latency",

@@ -101,8 +101,7 @@ def evaluate(
 
     Args:
         task: A :class:`Task`, its class, a registered name (:func:`task_names`), or a benchmark, which fixes all options that
-            affect the
-            data: its folder, or ``benchmark:pick`` and similar, which the package contains.
+            affect the data: its folder, or ``benchmark:pick`` and similar, which the package contains.
         robot: A registered name (:func:`robot_names`), the path of a ``.toml``, or a :class:`Robot`; by default the task's robot.
         policy: A :class:`Policy`, a class or object with ``act`` (:class:`mjsense.evaluation.BatchedPolicy`), a function
             ``obs -> actions``, or a text: a registered name (:func:`policy_names`), ``random``, ``replay:DIR``, ``lerobot:DIR``,

@@ -35,8 +35,7 @@ class ReplayedPolicy(Policy):
 
     Files contain commands as float32. If the commands of a move group are joint positions, the targets of its controller are
     used, which are recorded as float64 except in the last step of an episode that ended before its horizon. Until then the
-    episode repeats bit for bit. ``action_noise`` is that of the recording: the noise depends on the seed
-    and the episode only.
+    episode repeats bit for bit. ``action_noise`` is that of the recording: the noise depends on the seed and the episode only.
     """
 
     name = "replay"

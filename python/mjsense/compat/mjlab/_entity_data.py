@@ -56,7 +56,8 @@ class EntityData:
         model = simulation.model
         named = [mujoco_names.name2id(model, mujoco_names.Obj.BODY, f"{entity.name}/{name}") for name in entity.body_names]
         self._name, self._data = entity.name, Data(simulation)
-        self._bodies = np.array(sorted(body for body in named if body >= 0))
+        self._bodies = np.array(sorted(body for body in named if body >= 0), int)
+        self._trees = np.array(model.body_rootid)[self._bodies]
         joints = [j for j in range(model.njnt) if model.jnt_bodyid[j] in set(named)]
         free = [j for j in joints if model.jnt_type[j] == _FREE]
         self._free = (int(model.jnt_qposadr[free[0]]), int(model.jnt_dofadr[free[0]])) if free else None
@@ -121,9 +122,9 @@ class EntityData:
     @property
     def body_link_vel_w(self) -> Any:
         spatial = self._field("cvel")[:, self._bodies]
-        offset = self._field("subtree_com")[:, self._bodies[:1]] - self._field("xpos")[:, self._bodies]
+        offset = self._field("subtree_com")[:, self._trees] - self._field("xpos")[:, self._bodies]  # MuJoCo's cvel is about it
         angular = spatial[..., :3]
-        return _join(spatial[..., 3:] - _cross(angular, offset + 0 * angular), angular)
+        return _join(spatial[..., 3:] - _cross(angular, offset), angular)
 
     @property
     def root_link_pose_w(self) -> Any:

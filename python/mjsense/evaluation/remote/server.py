@@ -31,10 +31,10 @@ class PolicyServer:
 
     A message is a map from names of sensors or streams to arrays,
     ``{"qpos/arm": [7], "wrist_camera": [H, W, 3], "prompt": "Pick up the mug"}``, in which maps may be nested. The answer is
-    ``{"actions": [H, n], "server_timing": {"infer_ms": 1.2}}``. A connection is an
-    episode: the policy's ``reset`` is called before its first message. All connections share one policy, whose world ids are
-    their numbers. It is called for one message at a time. Messages that are wrong, and exceptions of the policy, are answered by
-    their text, after which the connection is closed.
+    ``{"actions": [H, n], "server_timing": {"infer_ms": 1.2}}``. A connection is an episode: the policy's ``reset`` is called
+    before its first message. All connections share one policy, whose world ids are their numbers. It is called for one message at
+    a time. Messages that are wrong, and exceptions of the policy, are answered by their text, after which the connection is
+    closed.
 
     Args:
         policy: See :func:`mjsense.evaluation.policy_from`. Policies that are computed together with their episode, such as
@@ -48,8 +48,8 @@ class PolicyServer:
         host: Address to listen at. Every program that can connect to it can use the policy.
         port: Port; 0: any free one.
         connections: Maximum number of connections. Further ones are refused.
-        key_file: File with a key that clients must have: they send it as ``Authorization: Api-Key KEY``.
-            Empty: no key.
+        key_file: File with a key that clients must have: they send it as ``Authorization: Api-Key KEY``. Empty: no
+            key.
         certificate, private_key: PEM files with which the server encrypts its connections, ``wss://HOST:PORT``. Empty: no
             encryption.
         log: Called with a line for each error.
