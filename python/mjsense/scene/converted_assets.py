@@ -12,6 +12,7 @@ import numpy as np
 
 from mjsense.core.new_output import new_output
 from mjsense.core.optional import optional
+from mjsense.core.srgb import decoded, encoded
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -172,7 +173,7 @@ class _Writer:
         out = ElementTree.SubElement(self._assets, "material", name=name)
         if not see_through:
             factor[3] = 1
-        out.set("rgba", _numbers(np.append(_encoded(factor[:3]), factor[3])))
+        out.set("rgba", _numbers(np.append(encoded(factor[:3]), factor[3])))
         out.set("metallic", f"{_share(material.metallicFactor):.4g}")
         out.set("roughness", f"{_share(material.roughnessFactor):.4g}")
         colours = material.baseColorTexture
@@ -200,7 +201,7 @@ class _Writer:
             if material.emissiveTexture is not None:
                 glow = self._pixels(material.emissiveTexture, "RGB")
             strength = light.max()
-            glow = np.round(255 * _encoded(_decoded(glow / 255) * light / strength)).astype(np.uint8)
+            glow = np.round(255 * encoded(decoded(glow / 255) * light / strength)).astype(np.uint8)
             out.set("emission", f"{strength:.4g}")
             self._add_layer(out, "emissive", glow)
         return name
@@ -250,12 +251,3 @@ def _factor(value: Any, size: int, default: float = 1) -> np.ndarray:
 
 def _share(value: float | None, default: float = 1) -> float:
     return float(np.clip(default if value is None else value, 0, 1))
-
-
-def _encoded(linear: np.ndarray) -> np.ndarray:
-    linear = np.clip(linear, 0, 1)
-    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-
-
-def _decoded(encoded: np.ndarray) -> np.ndarray:
-    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)

@@ -12,6 +12,7 @@ import struct
 
 import numpy as np
 
+from mjsense.core.srgb import decoded
 from mjsense.viewer.geometry import Triangles
 
 _FLOAT, _UINT = 5126, 5125
@@ -20,8 +21,7 @@ _VERTICES, _FACES = 34962, 34963  # targets of buffer views
 
 def linear(colour: np.ndarray) -> list[float]:
     """sRGB colours 0 to 1 as glTF's linear factors."""
-    c = np.clip(np.asarray(colour, np.float64), 0, 1)
-    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4).tolist()
+    return decoded(np.asarray(colour, np.float64)).tolist()
 
 
 def glb(shape: Triangles, image: bytes, mime: str, rgba: np.ndarray, roughness: float) -> bytes:

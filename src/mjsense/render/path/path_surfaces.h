@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What path tracing shares with the kernels of images: the surface at a hit, with its normal and
-// textures, the sky, haze and fog that a pixel shows, and the tone mapping. Frame: the camera's.
+// textures, and the sky, haze and fog that a pixel shows. Frame: the camera's.
 
 #include <span>
 
@@ -36,8 +36,5 @@ struct PathPixel {
 
 // Replaces the radiance of pixels that hit nothing by the background's; adds haze and fog.
 void add_background(const View& view, std::span<PathPixel> pixels);
-
-// From linear radiance [pixels, 3] to the colours of a display, 0..1, in place.
-void map_to_display(const PhysicalView& view, std::span<float> rgb);
 
 }  // namespace mjsense::render

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include "mjsense/render/kernels/display_colors.h"
 #include "mjsense/render/path/path_wave.h"
 
 namespace mjsense::render {

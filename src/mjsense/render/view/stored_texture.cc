@@ -11,6 +11,7 @@
 
 #include "mjsense/core/content_cache.h"
 #include "mjsense/core/system/cpu.h"
+#include "mjsense/render/light/tone_map.h"
 
 namespace mjsense::render {
 namespace {
@@ -19,9 +20,7 @@ namespace {
 std::array<std::uint8_t, 256> linear_values() {
   std::array<std::uint8_t, 256> table;
   for (int i = 0; i < 256; ++i) {
-    const double v = i / 255.0;
-    const double linear = v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
-    table[i] = static_cast<std::uint8_t>(std::lround(255.0 * linear));
+    table[i] = static_cast<std::uint8_t>(std::lround(255.0 * srgb_decode(i / 255.0)));
   }
   return table;
 }

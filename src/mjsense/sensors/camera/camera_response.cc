@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mjsense/render/path/path_surfaces.h"
+#include "mjsense/render/kernels/display_colors.h"
+#include "mjsense/render/light/tone_map.h"
 
 namespace mjsense::sensors {
 namespace {
@@ -28,8 +29,8 @@ double falloff(const render::PixelGrid& grid, int x, int y) {
 }  // namespace
 
 ImagerCfg imager_preset(Imager imager) {
-  // f_number: Intel, RealSense D400 Series data sheet (337029), colour sensor of the D435; Stereolabs, ZED
-  // Mini data sheet. exposure_time: both take 30 images per second. full_well and read_noise: not
+  // f_number: Intel, RealSense D400 Series data sheet (337029), colour sensor of the D435; that of the ZED
+  // Mini is an assumption. exposure_time: both take 30 images per second. full_well and read_noise: not
   // published for the OV2740 (1.4 um pixels) and OV4689 (2 um) in them. Those of OmniVision's OV5647, which
   // has 1.4 um pixels, are 4300 electrons and 68 dB, thus 4300 / 10^(68 / 20) = 1.7 electrons; for 2 um,
   // the full well grows with the area. bits: both sensors have 10 bits. vignetting: half of the natural

@@ -46,8 +46,6 @@ class CameraResponse {
   // Writes rgb [H, W, 3] for an image at `time`, s, with this radiance.
   void develop(int world, double time, const render::PixelGrid& grid, Rng rng,
                const float* radiance, std::uint8_t* rgb);
-  // Of the world's last image.
-  double exposure(int world) const { return states_[world].exposure; }
 
  private:
   struct State {
