@@ -31,7 +31,7 @@ def headers_of(key: str) -> dict[str, str]:
 
 
 def is_allowed(headers: Mapping[str, str], key: str) -> bool:
-    """Whether a client has the key; without a key, all clients are allowed. The time does not depend on where a wrong one differs."""
+    """Whether a client has the key. Without a key, all clients are allowed. The time does not depend on where it differs."""
     given = headers.get(HEADER, "").encode(errors="replace")
     return not key or hmac.compare_digest(given, headers_of(key)[HEADER].encode())
 
