@@ -29,7 +29,7 @@ from hypothesis import strategies as st
 
 import mjsense as mjs
 from mjsense.core.errors import UnknownNameError
-from mjsense.dataset import archive, bounded_json, closed_model, import_lerobot, index, json_rows
+from mjsense.dataset import archive, bounded_json, closed_model, index, json_rows, lerobot_reader
 from mjsense.dataset.description import Description
 from mjsense.dataset.hdf5 import Group, open_h5
 from mjsense.evaluation.remote import messages
@@ -276,7 +276,7 @@ def read_lerobot(content: tuple[Any, Any, Any], folder: Path) -> None:
     for place, bytes_ in (("meta/info.json", _json(info)), ("meta/episodes/chunk-000/file-000.parquet", _parquet(episodes)), ("data/chunk-000/file-000.parquet", _parquet(rows))):
         (folder / place).parent.mkdir(parents=True, exist_ok=True)
         (folder / place).write_bytes(bytes_)
-    source = import_lerobot._Source(folder)
+    source = lerobot_reader.LeRobotReader(folder)
     for number in source.episodes:
         rows = source.rows(number)
         for key in source.images:

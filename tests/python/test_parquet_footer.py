@@ -9,14 +9,15 @@ import pytest
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")
 
-from mjsense.dataset import import_lerobot, index, parquet_footer
+from mjsense.dataset import index, parquet_footer
+from mjsense.dataset.lerobot_reader import LeRobotReader
 
 ROW = {"episode": [0], "path": ["house_0/trajectories_batch_1_of_1.h5"], "trajectory": ["traj_0"], "seed": [1], "length": [2], "success": [True], "outcome": ["success"], "task": ["pick"]}
 
 
 def lerobot_reader(path):
     """Reads a table as the import of LeRobot data sets does."""
-    source = object.__new__(import_lerobot._Source)
+    source = object.__new__(LeRobotReader)
     source.root, source._tables = path.parent, pq
     return lambda path: source._table(path, source._names(path))
 
