@@ -254,7 +254,7 @@ inline FieldHit intersect_height_field(const HeightField& field, Vec3f o, Vec3f 
   if (any(t_base < Float(kNoHit)))
     take(hit, t_base < Float(kNoHit), t_base, int_of(-1), Box::normal(base, along(ob, t_base, d)));
 
-  const float top[3] = {field.size[0], field.size[1], 0.5f * field.size[2]};
+  const float top[3] = {field.size[0], field.size[1], 0.5f * field.lid};
   const Vec3f ot = {o.x, o.y, o.z - top[2]};
   const Interval level = slab(top[2], ot.z, d.z);
   Interval in = Box::interval(top, ot, d);

@@ -252,6 +252,23 @@ TEST_P(HeightFields, CullingAgreesWithTrace) {
   EXPECT_GT(hits, lanes / 3);
 }
 
+//    /\    2 size[2]      The compiler scales heights to 0..1, but programs write others, such as
+//   /  \-- size[2]        metres, into hfield_data.
+TEST_P(HeightFields, HeightsAboveOneAreHit) {
+  const TestModel m(
+      "<mujoco><asset><hfield name='h' nrow='3' ncol='3' size='1 1 .7 .1' elevation='0 0 0  0 1 0 "
+      " 0 0 0'/></asset><worldbody><geom type='hfield' hfield='h' pos='.1 .2 .3'/></worldbody>"
+      "</mujoco>");
+  m.model->hfield_data[4] = 2;
+  RayScene scene(m.model, 1, isa());
+  scene.update(m.world());
+  const double above[3] = {0.1, 0.2, 3}, down[3] = {0, 0, -1};
+  EXPECT_NEAR(scene.trace(0, {}, above, down).t, 3 - (0.3 + 1.4), 1e-6);
+  // At three quarters of the height, above size[2].
+  const double beside[3] = {-2.9, 0.2, 0.3 + 1.05}, forward[3] = {1, 0, 0};
+  EXPECT_NEAR(scene.trace(0, {}, beside, forward).t, 3 - 0.25, 1e-5);
+}
+
 // A ray that leaves the ground hits the surface from below; the normal points up.
 TEST_P(HeightFields, RayFromInsideHitsAFlatTop) {
   const TestModel m(

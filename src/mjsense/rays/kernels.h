@@ -21,7 +21,7 @@ struct RayCandidate;
 
 struct HeightField {
   static constexpr int kBlock = 8;  // cells per side of a block
-  const float* data;                // [rows, cols], 0..1
+  const float* data;                // [rows, cols], 0..1; programs may write larger values
   int rows, cols;
   float size[4];  // m: half x, half y, height of the value 1, thickness of the base
   void* scene;  // RTCScene of the surface (z up), face = 2 * cell + triangle; null without cameras
@@ -29,6 +29,7 @@ struct HeightField {
   const float* block_tops;
   int block_cols;
   float top;       // m, maximum height
+  float lid;       // m, upper side of the box around the surface
   float steepest;  // maximum slope
 };
 

@@ -100,10 +100,12 @@ SharedGeometry::SharedGeometry(const mjModel* m) {
     field.block_tops = block_tops.back().data();
     field.block_cols = blocks(field.cols);
     field.top = *std::max_element(block_tops.back().begin(), block_tops.back().end());
+    field.lid = std::max(field.size[2], field.top);
     field.steepest = steepest_slope(field);
     height_fields.push_back(field);
     const float* s = field.size;
-    bounds.height_fields.push_back({0, 0, 0.5f * (s[2] - s[3]), s[0], s[1], 0.5f * (s[2] + s[3])});
+    bounds.height_fields.push_back(
+        {0, 0, 0.5f * (field.lid - s[3]), s[0], s[1], 0.5f * (field.lid + s[3])});
   }
 }
 
