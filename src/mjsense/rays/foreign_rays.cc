@@ -22,7 +22,7 @@ ForeignRays::ForeignRays(const worlds::Worlds& worlds)
       pool_(worlds.threads()),
       scratch_(pool_.size(), RayScratch(scene_.num_objects())) {}
 
-void ForeignRays::cast(worlds::Worlds& worlds, const ForeignRaysQuery& query) {
+void ForeignRays::update(worlds::Worlds& worlds) {
   worlds::apply_ordered(
       worlds.batch(), nullptr, 0,
       [](const mjModel* m, mjData* d, int w, void* scene) {
@@ -33,6 +33,10 @@ void ForeignRays::cast(worlds::Worlds& worlds, const ForeignRaysQuery& query) {
         static_cast<RayScene*>(scene)->update(world);
       },
       &scene_, 0);
+}
+
+void ForeignRays::cast(worlds::Worlds& worlds, const ForeignRaysQuery& query) {
+  update(worlds);
   const int packets = (query.count + kPacket - 1) / kPacket,
             chunks = (packets + kChunk - 1) / kChunk;
   pool_.run_near(worlds.size() * chunks, [&](int item, int thread) {

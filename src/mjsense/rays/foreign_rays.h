@@ -28,9 +28,14 @@ struct ForeignRaysQuery {
 
 class ForeignRays {
  public:
+  // `worlds` are those of all later calls.
   ForeignRays(const worlds::Worlds& worlds);
-  // `worlds` are those of the constructor, whose poses are current.
+  // Casts rays into the worlds, whose poses are current.
   void cast(worlds::Worlds& worlds, const ForeignRaysQuery& query);
+  // Copies the worlds' poses and appearance to scene(), for images.
+  void update(worlds::Worlds& worlds);
+  const RayScene& scene() const { return scene_; }
+  ThreadPool& pool() { return pool_; }
 
  private:
   void cast_packets(int world, int begin, int end, const ForeignRaysQuery& query,
