@@ -39,6 +39,8 @@ MODEL = mujoco.MjModel.from_xml_string("""
 INPUTS = ("body_mass", "body_inertia", "body_ipos", "dof_armature", "qpos0", "body_pos")
 FIELDS = (*compat._FIXED, *(name for name in (*compat._KINEMATICS, *compat._INERTIA) if name != "eq_data"))
 POSITIONS = ("xpos", "xquat", "xipos", "geom_xpos", "site_xmat", "cam_xpos", "light_xpos", "subtree_com", "cdof", "cinert", "ten_length")
+if hasattr(mjw, "SetConstGroup"):  # version 4.0 does not restore these
+    POSITIONS = tuple(name for name in POSITIONS if not name.startswith(("cam", "light")))
 POSITIONS += ("actuator_length", "crb", "M", "qpos", "qvel", "time")
 
 
