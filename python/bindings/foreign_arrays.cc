@@ -76,8 +76,8 @@ class PyForeignArrays {
 
   // id, width, height; left, top, dx, dy of the pixels or nothing; addresses of rgb, depth and
   // segmentation, 0: not requested.
-  using Camera = std::tuple<int, int, int, std::optional<std::array<float, 4>>,
-                            std::array<std::uintptr_t, 3>>;
+  using Camera =
+      std::tuple<int, int, int, std::optional<std::array<float, 4>>, std::array<std::uintptr_t, 3>>;
 
   void render(const std::vector<Camera>& given, const std::array<std::size_t, 3>& rows,
               unsigned groups, bool textures, bool shadows, bool skybox, std::uint32_t background) {
@@ -152,7 +152,8 @@ void bind_foreign_arrays(nb::module_& m) {
       .def("render", &PyForeignArrays::render, nb::arg("cameras"), nb::arg("rows"),
            nb::arg("groups"), nb::arg("textures"), nb::arg("shadows"), nb::arg("skybox"),
            nb::arg("background"),
-           "Draws images. cameras: id, width, height, (left, top, dx, dy) or None, addresses of rgb, "
+           "Draws images. cameras: id, width, height, (left, top, dx, dy) or None, addresses of "
+           "rgb, "
            "depth and segmentation of world 0. rows: numbers from one world to the next in them.")
       .def(
           "set_constants",

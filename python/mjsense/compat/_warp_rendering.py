@@ -45,7 +45,10 @@ def geom_groups(source: Any, rc: Any) -> list[int]:
 def cameras_of(rc: Any) -> list[tuple[int, int, int, tuple[float, ...] | None, tuple[int, int, int]]]:
     """The arguments of ``ForeignArrays.render``."""
     found, first = [], 0
-    wanted = [(getattr(rc, f"{name}_data"), getattr(rc, f"{name}_adr").numpy(), getattr(rc, f"render_{name}").numpy()) for name in _KINDS]
+    wanted = [
+        (getattr(rc, f"{name}_data"), getattr(rc, f"{name}_adr").numpy(), getattr(rc, f"render_{name}").numpy())
+        for name in _KINDS
+    ]
     rays = rc.ray.numpy() if rc.use_precomputed_rays else None
     for index, (camera, (width, height)) in enumerate(zip(rc.cam_id_map.numpy().tolist(), rc.cam_res.numpy().tolist())):
         pixels = None if rays is None else _pixels(rays[first : first + width * height], width, height)

@@ -31,10 +31,8 @@ ForeignImages::ForeignImages(const worlds::Worlds& worlds, const ForeignImagesOp
   const auto geoms = static_cast<int>(ViewBuilder::max_geoms(worlds.model()));
   threads_.reserve(worlds.threads());
   for (int i = 0; i < worlds.threads(); ++i)
-    threads_.push_back({ViewBuilder(worlds.model(), assets_, view_options(options)),
-                        TileMemory(geoms),
-                        {},
-                        {}});
+    threads_.push_back(
+        {ViewBuilder(worlds.model(), assets_, view_options(options)), TileMemory(geoms), {}, {}});
 }
 
 void ForeignImages::render(worlds::Worlds& worlds, rays::ForeignRays& rays,
@@ -49,9 +47,9 @@ void ForeignImages::render(worlds::Worlds& worlds, rays::ForeignRays& rays,
     appearances_[w].copy(&m);
     for (int c = 0; c < count; ++c) {
       const ForeignCamera& camera = cameras[c];
-      grids_[w * count + c] =
-          camera.grid ? *camera.grid
-                      : grid_of_camera(&m, camera.camera, camera.width, camera.height);
+      grids_[w * count + c] = camera.grid
+                                  ? *camera.grid
+                                  : grid_of_camera(&m, camera.camera, camera.width, camera.height);
     }
   }
   std::size_t pixels = 0;

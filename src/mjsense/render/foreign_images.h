@@ -22,10 +22,10 @@ namespace mjsense::render {
 // length; null: not requested.
 struct ForeignCamera {
   int camera = 0, width = 0, height = 0;
-  std::optional<PixelGrid> grid;          // otherwise of the camera of each world's model
-  std::uint32_t* rgb = nullptr;           // 0xffrrggbb
-  float* depth = nullptr;                 // planar, m; 0 where nothing is seen
-  std::int32_t* segmentation = nullptr;   // (id, mjtObj); -1 where nothing is seen
+  std::optional<PixelGrid> grid;         // otherwise of the camera of each world's model
+  std::uint32_t* rgb = nullptr;          // 0xffrrggbb
+  float* depth = nullptr;                // planar, m; 0 where nothing is seen
+  std::int32_t* segmentation = nullptr;  // (id, mjtObj); -1 where nothing is seen
 };
 
 struct ForeignImagesOptions {

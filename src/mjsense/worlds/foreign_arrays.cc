@@ -29,14 +29,40 @@ constexpr std::string_view kReset[] = {"qacc", "act_dot", "sensordata", "energy"
 // Fields of constraints that mj_step1 does not compute.
 constexpr std::string_view kSolved[] = {"efc_state", "efc_force"};
 // Fields that kPositions shows.
-constexpr std::string_view kPositions[] = {
-    "xpos",          "xquat",          "xmat",           "xipos",           "ximat",
-    "xanchor",       "xaxis",          "geom_xpos",      "geom_xmat",       "site_xpos",
-    "site_xmat",     "cam_xpos",       "cam_xmat",       "light_xpos",      "light_xdir",
-    "subtree_com",   "cdof",           "cinert",         "flexvert_xpos",   "flexedge_J",
-    "flexedge_length", "ten_wrapadr",  "ten_wrapnum",    "ten_J",           "ten_length",
-    "wrap_obj",      "wrap_xpos",      "actuator_length", "moment_rownnz",  "moment_rowadr",
-    "moment_colind", "actuator_moment", "crb",           "M"};
+constexpr std::string_view kPositions[] = {"xpos",
+                                           "xquat",
+                                           "xmat",
+                                           "xipos",
+                                           "ximat",
+                                           "xanchor",
+                                           "xaxis",
+                                           "geom_xpos",
+                                           "geom_xmat",
+                                           "site_xpos",
+                                           "site_xmat",
+                                           "cam_xpos",
+                                           "cam_xmat",
+                                           "light_xpos",
+                                           "light_xdir",
+                                           "subtree_com",
+                                           "cdof",
+                                           "cinert",
+                                           "flexvert_xpos",
+                                           "flexedge_J",
+                                           "flexedge_length",
+                                           "ten_wrapadr",
+                                           "ten_wrapnum",
+                                           "ten_J",
+                                           "ten_length",
+                                           "wrap_obj",
+                                           "wrap_xpos",
+                                           "actuator_length",
+                                           "moment_rownnz",
+                                           "moment_rowadr",
+                                           "moment_colind",
+                                           "actuator_moment",
+                                           "crb",
+                                           "M"};
 constexpr std::string_view kPoses[] = {"geom_xpos", "geom_xmat",  "cam_xpos",
                                        "cam_xmat",  "light_xpos", "light_xdir"};
 
@@ -524,8 +550,8 @@ void ForeignArrays::set_constants(std::span<const std::string> fields, bool rest
 // Writes the worlds' values of a field into the rows of its array. Worlds that share a row have its values.
 void ForeignArrays::show_model(ModelField& f) {
   int size = 0, element = 0;
-  auto* rows = static_cast<std::byte*>(const_cast<void*>(
-      mjb_expanded(worlds_.batch(), f.name.c_str(), &size, &element)));
+  auto* rows = static_cast<std::byte*>(
+      const_cast<void*>(mjb_expanded(worlds_.batch(), f.name.c_str(), &size, &element)));
   const std::size_t own = static_cast<std::size_t>(size) * element,
                     bytes = f.count * dtype_size(f.dtype);
   for (int row = 0; row < f.num_rows; ++row) {

@@ -28,13 +28,12 @@ inline void shade_as_mujoco_warp(const View& view, const Surfaces& s, const Hits
   for (int i = 0; i < view.num_lights; ++i) {
     const ViewLight& light = view.lights[i];
     const Lit lit(light, s);
-    const std::uint32_t dark = shadows && light.casts_shadows
-                                   ? dark_lanes(view, i, lit, s, hits, lanes, *shadows)
-                                   : 0;
+    const std::uint32_t dark =
+        shadows && light.casts_shadows ? dark_lanes(view, i, lit, s, hits, lanes, *shadows) : 0;
     for (int k = 0; k < kLanes; k += kWidth) {
       const LightTerm& term = lit.terms[k / kWidth];
-      const Float scale = term.scale * select(mask_of(dark >> k & kAllLanes),
-                                              splat(kShareInShadow), splat(1.0f));
+      const Float scale =
+          term.scale * select(mask_of(dark >> k & kAllLanes), splat(kShareInShadow), splat(1.0f));
       const Float matte = scale * term.diffuse;
       const Float shine = scale * highlight(term, s, eye, k, lanes) * load(s.specular + k);
       for (int c = 0; c < 3; ++c) {
