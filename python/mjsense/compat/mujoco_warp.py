@@ -84,6 +84,9 @@ _KINEMATICS = (
 _INERTIA = ("dof_invweight0", "body_invweight0", "tendon_invweight0", "actuator_acc0")
 """What mujoco_warp's ``set_const`` derives."""
 
+_CHECKED_BYTES = 1 << 16
+"""Of the geometry, compared in each call with that of put_model(), in turn."""
+
 _models: dict[int, Any] = {}
 """By the id of a ``mujoco_warp.Model``: a copy of the ``mujoco.MjModel`` that it was made of."""
 _worlds: dict[int, Worlds] = {}
@@ -176,6 +179,10 @@ class Worlds:
         self._options = {name: int(getattr(source.opt, name)) for name in _OPTIONS if hasattr(model.opt, name)}
         self._others: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         """Arrays of the model that MuJoCo does not have in this form, and their values at the last step."""
+        self._geometry: dict[str, bytes] = {}
+        """Arrays of the model that are large and must not be changed, as they were at first."""
+        self._parts_of_geometry: list[tuple[str, memoryview, bytes]] = []
+        self._next = 0
         self._set_options()
         self._link()
 
@@ -201,10 +208,12 @@ class Worlds:
         self._parts: list[tuple[dict[str, Any], tuple[Any, ...]]] = [({}, (None,))]  # an error leaves what no program has
         self._arrays.clear(data.naconmax, data.njmax)
         others: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self._parts_of_geometry = []
         self.shown, self.left = [], []
         self._linked: set[str] = set()
         parts = [("", "data", data), ("contact.", "contact", data.contact), ("efc.", "data", data.efc)]
         for prefix, kind, part in parts:
+            self._check_arrays("data", prefix, part)
             for name in _array_fields(part):
                 rows = part.worldid.shape[0] if kind == "contact" else data.nworld
                 field = f"efc_{name}" if prefix == "efc." else name
@@ -214,11 +223,13 @@ class Worlds:
             self.left.remove("nacon")
             self.shown.append("nacon")
         for prefix, part in (("", self.model), ("opt.", self.model.opt)):
+            self._check_arrays("model", prefix, part)
             hints = {field.name: field.type for field in dataclasses.fields(part)}
             for name in _array_fields(part):
-                if name.startswith(_GEOMETRY):
-                    continue
                 array = getattr(part, name)
+                if name.startswith(_GEOMETRY):
+                    self._keep_geometry(prefix + name, array)
+                    continue
                 by_world = getattr(hints[name], "shape", ("",))[:1] == ("*",)
                 rows = array.shape[0] if by_world else 1
                 if self._add("model", part, name, prefix + name, rows, False):
@@ -233,6 +244,51 @@ class Worlds:
         self._parts = [
             (vars(part), (*vars(part).values(),)) for part in (data, data.contact, data.efc, self.model, self.model.opt)
         ]
+
+    def _keep_geometry(self, name: str, array: Any) -> None:
+        if not array.size or not array.device.is_cpu or not array.is_contiguous or array.dtype in (wp.uint64, wp.Texture2D):
+            return
+        now = memoryview(np.ascontiguousarray(array.numpy())).cast("B")
+        before = self._geometry.setdefault(name, bytes(now))
+        if len(now) != len(before):
+            raise ValueError(f"{name} cannot be changed after put_model(): it had {len(before)} bytes, and has {len(now)}")
+        for first in range(0, len(now), _CHECKED_BYTES):
+            part = slice(first, first + _CHECKED_BYTES)
+            self._parts_of_geometry.append((name, now[part], before[part]))
+
+    def _check_geometry(self) -> None:
+        """Compares the next part of the geometry with what it was."""
+        compared = 0
+        for _ in self._parts_of_geometry:
+            self._next = (self._next + 1) % len(self._parts_of_geometry)
+            name, now, before = self._parts_of_geometry[self._next]
+            if now.tobytes() != before:
+                raise ValueError(f"{name} cannot be changed after put_model(): make the model anew")
+            compared += len(now)
+            if compared >= _CHECKED_BYTES:
+                break
+
+    def _check_arrays(self, owner: str, prefix: str, part: Any) -> None:
+        """Raises ValueError if a program has replaced an array by one of another size or type."""
+        data: Any = self._data()
+        for field in dataclasses.fields(part):
+            array, wanted = getattr(part, field.name), field.type
+            if not isinstance(array, wp.array) or not isinstance(getattr(wanted, "shape", None), tuple):
+                continue
+            rows = owner == "model" and wanted.shape[:1] == ("*",) and array.shape[0] == 0 and all(array.shape[1:])
+            if not array.size and field.name not in _STATE and not rows:
+                continue  # mujoco_warp does not allocate what the model does not need
+            named = [
+                size if isinstance(size, int) else getattr(data, size, getattr(self.model, size, None)) for size in wanted.shape
+            ]
+            same = len(named) == array.ndim and all(size is None or size == n for size, n in zip(named, array.shape))
+            if not same or rows:
+                shape = tuple("*" if size is None else size for size in named)
+                raise ValueError(f"{prefix}{field.name} of the {owner} has the shape {array.shape}, expected {shape}")
+            if _elements(array.dtype) != _elements(wanted.dtype):
+                raise ValueError(
+                    f"{prefix}{field.name} of the {owner} has elements of {array.dtype.__name__}, expected {wanted.dtype.__name__}"
+                )
 
     def _add(self, kind: str, part: Any, name: str, field: str, rows: int, state: bool) -> bool:
         array = getattr(part, name)
@@ -284,6 +340,7 @@ class Worlds:
                 self._set_options()
                 self._link()
                 break
+        self._check_geometry()
         for name, (now, before) in self._others.items():
             if now.tobytes() != before.tobytes():
                 self._changed(name, now)
@@ -338,6 +395,12 @@ class Worlds:
         if name != "opt.impratio_invsqrt":
             raise ValueError(f"{name} cannot be changed after put_model()")
         self._arrays.set_option("opt.impratio", (now.astype(float) ** -2).tolist())
+
+
+def _elements(dtype: Any) -> tuple[Any, int]:
+    """The kind of the numbers of a Warp type, and the bytes of an element."""
+    kind = getattr(dtype, "_wp_scalar_type_", dtype)
+    return {bool: wp.bool, int: wp.int32, float: wp.float32}.get(kind, kind), wp.types.type_size_in_bytes(dtype)
 
 
 def _array_fields(part: Any) -> list[str]:
