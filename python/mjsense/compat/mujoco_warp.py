@@ -268,27 +268,29 @@ class Worlds:
             if compared >= _CHECKED_BYTES:
                 break
 
+    def _size(self, name: str) -> int | None:
+        """A size of the data or the model, for example nq; None if there is no such one."""
+        return getattr(self._data(), name, getattr(self.model, name, None))
+
     def _check_arrays(self, owner: str, prefix: str, part: Any) -> None:
         """Raises ValueError if a program has replaced an array by one of another size or type."""
-        data: Any = self._data()
         for field in dataclasses.fields(part):
             array, wanted = getattr(part, field.name), field.type
             if not isinstance(array, wp.array) or not isinstance(getattr(wanted, "shape", None), tuple):
                 continue
+            if prefix + field.name in ("efc.J", *_OTHER):  # which are not written, and have several forms
+                continue
             rows = owner == "model" and wanted.shape[:1] == ("*",) and array.shape[0] == 0 and all(array.shape[1:])
             if not array.size and field.name not in _STATE and not rows:
                 continue  # mujoco_warp does not allocate what the model does not need
-            named = [
-                size if isinstance(size, int) else getattr(data, size, getattr(self.model, size, None)) for size in wanted.shape
-            ]
+            named = [size if isinstance(size, int) else self._size(size) for size in wanted.shape]
             same = len(named) == array.ndim and all(size is None or size == n for size, n in zip(named, array.shape))
             if not same or rows:
                 shape = tuple("*" if size is None else size for size in named)
                 raise ValueError(f"{prefix}{field.name} of the {owner} has the shape {array.shape}, expected {shape}")
             if _elements(array.dtype) != _elements(wanted.dtype):
-                raise ValueError(
-                    f"{prefix}{field.name} of the {owner} has elements of {array.dtype.__name__}, expected {wanted.dtype.__name__}"
-                )
+                found, expected = array.dtype.__name__, wanted.dtype.__name__
+                raise ValueError(f"{prefix}{field.name} of the {owner} has elements of {found}, expected {expected}")
 
     def _add(self, kind: str, part: Any, name: str, field: str, rows: int, state: bool) -> bool:
         array = getattr(part, name)
