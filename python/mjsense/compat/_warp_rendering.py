@@ -19,6 +19,12 @@ def reason_to_leave(model: Any, source: Any, rc: Any) -> str:
     off = [name for name in _ON if not getattr(rc, name, True)]
     if off:
         return f"{off[0]} is False"
+    if (
+        rc.enabled_geom_ids.size
+        and rc.enabled_geom_ids.numpy().max() >= source.ngeom
+        or rc.cam_id_map.numpy().max() >= source.ncam
+    ):
+        raise ValueError("render(): the render context belongs to another model: it has geoms or cameras that the model lacks")
     if model.nflex:
         return "the model has flexes"
     if getattr(rc, "splat_count", 0):
@@ -45,14 +51,11 @@ def geom_groups(source: Any, rc: Any) -> list[int]:
 def cameras_of(rc: Any) -> list[tuple[int, int, int, tuple[float, ...] | None, tuple[int, int, int]]]:
     """The arguments of ``ForeignArrays.render``."""
     found, first = [], 0
-    wanted = [
-        (getattr(rc, f"{name}_data"), getattr(rc, f"{name}_adr").numpy(), getattr(rc, f"render_{name}").numpy())
-        for name in _KINDS
-    ]
+    wanted = [(name, *(getattr(rc, part.format(name)) for part in ("{}_data", "{}_adr", "render_{}"))) for name in _KINDS]
     rays = rc.ray.numpy() if rc.use_precomputed_rays else None
     for index, (camera, (width, height)) in enumerate(zip(rc.cam_id_map.numpy().tolist(), rc.cam_res.numpy().tolist())):
         pixels = None if rays is None else _pixels(rays[first : first + width * height], width, height)
-        arrays = [data.ptr + int(places[index]) * _bytes(data) if on[index] else 0 for data, places, on in wanted]
+        arrays = [_place(data, places, on, index, width * height, name) for name, data, places, on in wanted]
         if any(arrays):
             found.append((camera, width, height, pixels, tuple(arrays)))
         first += width * height
@@ -62,8 +65,17 @@ def cameras_of(rc: Any) -> list[tuple[int, int, int, tuple[float, ...] | None, t
 _KINDS = ("rgb", "depth", "seg")
 
 
-def _bytes(data: Any) -> int:
-    return data.strides[-1]
+def _place(data: Any, places: Any, on: Any, index: int, pixels: int, name: str) -> int:
+    """The address of the images of a camera in world 0; 0 if they are not wanted."""
+    if not on.numpy()[index]:
+        return 0
+    place = int(places.numpy()[index])
+    if place < 0 or place + pixels > data.shape[1]:
+        raise ValueError(
+            f"render(): {name}_data of the render context has {data.shape[1]} pixels for each world, and camera {index} of it "
+            f"needs those from {place} to {place + pixels}"
+        )
+    return data.ptr + place * data.strides[-1]
 
 
 def row_lengths(rc: Any) -> tuple[int, int, int]:

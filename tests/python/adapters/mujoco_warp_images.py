@@ -160,12 +160,21 @@ wp.capture_launch(capture.graph)
 assert rc.rgb_data.numpy().all()
 
 wrong = mjw.create_render_context(MODEL, nworld=WORLDS + 1, cam_res=(8, 8), render_rgb=True)
-try:
-    mjw.render(model, data, wrong)
-except ValueError as error:
-    assert f"rgb_data of the render context is for {WORLDS + 1} worlds" in str(error), error
-else:
-    sys.exit("no error for a render context of another number of worlds")
+small = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/><camera/></worldbody></mujoco>")
+pair = mjw.put_model(small), mjw.put_data(small, mujoco.MjData(small), nworld=WORLDS)
+short = context()
+short.rgb_data = wp.zeros((WORLDS, 100), dtype=wp.uint32)
+for call, text in (
+    (lambda: mjw.render(model, data, wrong), f"rgb_data of the render context is for {WORLDS + 1} worlds"),
+    (lambda: mjw.render(*pair, context()), "the render context belongs to another model"),
+    (lambda: mjw.render(model, data, short), "rgb_data of the render context has 100 pixels for each world, and camera 0 of it needs"),
+):
+    try:
+        call()
+    except ValueError as error:
+        assert text in str(error), error
+    else:
+        sys.exit(f"no error: {text}")
 
 # Time of an image.
 rc = mjw.create_render_context(MODEL, nworld=WORLDS, cam_res=(160, 120), render_rgb=True, cam_active=[True, False, False], use_shadows=True)
