@@ -19,11 +19,7 @@ def reason_to_leave(model: Any, source: Any, rc: Any) -> str:
     off = [name for name in _ON if not getattr(rc, name, True)]
     if off:
         return f"{off[0]} is False"
-    if (
-        rc.enabled_geom_ids.size
-        and rc.enabled_geom_ids.numpy().max() >= source.ngeom
-        or rc.cam_id_map.numpy().max() >= source.ncam
-    ):
+    if max([*rc.enabled_geom_ids.numpy(), -1]) >= source.ngeom or max(rc.cam_id_map.numpy()) >= source.ncam:
         raise ValueError("render(): the render context belongs to another model: it has geoms or cameras that the model lacks")
     if model.nflex:
         return "the model has flexes"
