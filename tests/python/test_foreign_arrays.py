@@ -597,7 +597,7 @@ def test_images_use_the_poses_models_and_pixels_of_the_program():
     camera = (0, 3, 3, (-0.03, 0.03, 0.02, -0.02), (rgb.ctypes.data, depth.ctypes.data, 0))
     worlds.render([camera], (9, 9, 0), 1 << 1, False, False, False, 0xFF102030)
     np.testing.assert_allclose(depth[:, 4], [3, 2, 5], rtol=1e-6)
-    camera = (*camera[:3], (1.0, 1.0, 0.02, -0.02), camera[4])  # pixels beside the sphere
+    camera = (*camera[:3], (1.0, 1.0, 0.02, -0.02), camera[4])  # pixels next to the sphere
     worlds.render([camera], (9, 9, 0), 1 << 1, False, False, False, 0xFF102030)
     assert not depth.any()
     assert (rgb == 0xFF102030).all()

@@ -275,7 +275,8 @@ class Worlds:
     def _check_arrays(self, owner: str, prefix: str, part: Any) -> None:
         """Raises ValueError if a program has replaced an array by one of another size or type."""
         for field in dataclasses.fields(part):
-            array, wanted = getattr(part, field.name), field.type
+            array: Any = getattr(part, field.name)
+            wanted: Any = field.type
             if not isinstance(array, wp.array) or not isinstance(getattr(wanted, "shape", None), tuple):
                 continue
             if prefix + field.name in ("efc.J", *_OTHER):  # which are not written, and have several forms
