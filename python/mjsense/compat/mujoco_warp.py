@@ -248,7 +248,7 @@ class Worlds:
     def _keep_geometry(self, name: str, array: Any) -> None:
         if not array.size or not array.device.is_cpu or not array.is_contiguous or array.dtype in (wp.uint64, wp.Texture2D):
             return
-        now = memoryview(np.ascontiguousarray(array.numpy())).cast("B")
+        now = np.ascontiguousarray(array.numpy()).data.cast("B")
         before = self._geometry.setdefault(name, bytes(now))
         if len(now) != len(before):
             raise ValueError(f"{name} cannot be changed after put_model(): it had {len(before)} bytes, and has {len(now)}")
