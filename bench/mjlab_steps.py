@@ -193,7 +193,7 @@ def row(task: str, envs: int, warm: int) -> str:
     for number in range(len(STEPS)):
         for other in (theirs, plain):
             name, median, same = differences(env.sim, other[number], ours[number])
-            cells.append(f"{median:.0e} ({name}), {same:.0%}")
+            cells.append(f"{median:.0e} ({name}), {100 * same:.0f} %")
     return f"| {task} | {' | '.join(cells)} |"
 
 
