@@ -5,6 +5,7 @@
 #include <mujoco/mujoco.h>
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -32,8 +33,10 @@ class ForeignRays {
   ForeignRays(const worlds::Worlds& worlds);
   // Casts rays into the worlds, whose poses are current.
   void cast(worlds::Worlds& worlds, const ForeignRaysQuery& query);
-  // Copies the worlds' poses and appearance to scene(), for images.
-  void update(worlds::Worlds& worlds);
+  // Copies the worlds' poses to scene(), for images. `also` is called with each world's model, by many
+  // threads.
+  using Also = std::function<void(const mjModel* model, int world)>;
+  void update(worlds::Worlds& worlds, const Also& also = {});
   const RayScene& scene() const { return scene_; }
   ThreadPool& pool() { return pool_; }
 

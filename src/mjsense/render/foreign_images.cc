@@ -38,20 +38,18 @@ ForeignImages::ForeignImages(const worlds::Worlds& worlds, const ForeignImagesOp
 void ForeignImages::render(worlds::Worlds& worlds, rays::ForeignRays& rays,
                            std::span<const ForeignCamera> cameras, const RowLengths& rows,
                            std::uint32_t background) {
-  rays.update(worlds);
   const int count = static_cast<int>(cameras.size()), images = worlds.size() * count;
   grids_.resize(images);
-  int tile_rows = 1;
-  for (int w = 0; w < worlds.size(); ++w) {
-    const mjModel m = worlds.model_of(w);
-    appearances_[w].copy(&m);
+  rays.update(worlds, [&](const mjModel* m, int w) {
+    appearances_[w].copy(m);
     for (int c = 0; c < count; ++c) {
       const ForeignCamera& camera = cameras[c];
       grids_[w * count + c] = camera.grid
                                   ? *camera.grid
-                                  : grid_of_camera(&m, camera.camera, camera.width, camera.height);
+                                  : grid_of_camera(m, camera.camera, camera.width, camera.height);
     }
-  }
+  });
+  int tile_rows = 1;
   std::size_t pixels = 0;
   for (const ForeignCamera& camera : cameras) {
     tile_rows = std::max(tile_rows, (camera.height + kTileSize - 1) / kTileSize);
