@@ -3,16 +3,21 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <array>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "mjsense/rays/foreign_rays.h"
+#include "mjsense/render/foreign_images.h"
 #include "mjsense/worlds/foreign_arrays.h"
 #include "python/bindings/mujoco_callbacks.h"
 #include "python/bindings/process_guard.h"
@@ -69,11 +74,45 @@ class PyForeignArrays {
     });
   }
 
+  // id, width, height; left, top, dx, dy of the pixels or nothing; addresses of rgb, depth and
+  // segmentation, 0: not requested.
+  using Camera =
+      std::tuple<int, int, int, std::optional<std::array<float, 4>>, std::array<std::uintptr_t, 3>>;
+
+  void render(const std::vector<Camera>& given, const std::array<std::size_t, 3>& rows,
+              unsigned groups, bool textures, bool shadows, bool skybox, std::uint32_t background) {
+    std::vector<render::ForeignCamera> cameras;
+    for (const auto& [id, width, height, pixels, arrays] : given) {
+      render::ForeignCamera& camera = cameras.emplace_back();
+      camera.camera = id;
+      camera.width = width;
+      camera.height = height;
+      if (pixels)
+        camera.grid = render::PixelGrid{width,        height,       (*pixels)[0],
+                                        (*pixels)[1], (*pixels)[2], (*pixels)[3]};
+      camera.rgb = reinterpret_cast<std::uint32_t*>(arrays[0]);
+      camera.depth = reinterpret_cast<float*>(arrays[1]);
+      camera.segmentation = reinterpret_cast<std::int32_t*>(arrays[2]);
+    }
+    const render::ForeignImagesOptions options{groups, textures, shadows, skybox};
+    work([&](worlds::ForeignArrays& own) {
+      own.take_poses();
+      if (!rays_) rays_ = make_shared_guarded<rays::ForeignRays>(own.worlds());
+      if (!images_ || !(options == image_options_)) {
+        images_ = make_shared_guarded<render::ForeignImages>(own.worlds(), options);
+        image_options_ = options;
+      }
+      images_->render(own.worlds(), *rays_, cameras, {rows[0], rows[1], rows[2]}, background);
+    });
+  }
+
  private:
   const ProcessGuard process_;
   std::mutex mutex_;
   std::shared_ptr<worlds::ForeignArrays> arrays_;
   std::shared_ptr<rays::ForeignRays> rays_;
+  render::ForeignImagesOptions image_options_;
+  std::shared_ptr<render::ForeignImages> images_;
 };
 
 }  // namespace
@@ -110,6 +149,21 @@ void bind_foreign_arrays(nb::module_& m) {
            nb::arg("hidden"),
            "Casts rays into the worlds. arrays: addresses of origins, directions, excluded bodies, "
            "distances, geoms and normals. hidden: a byte for each geom.")
+      .def("render", &PyForeignArrays::render, nb::arg("cameras"), nb::arg("rows"),
+           nb::arg("groups"), nb::arg("textures"), nb::arg("shadows"), nb::arg("skybox"),
+           nb::arg("background"),
+           "Draws images. cameras: id, width, height, (left, top, dx, dy) or None, addresses of "
+           "rgb, "
+           "depth and segmentation of world 0. rows: numbers from one world to the next in them.")
+      .def(
+          "set_constants",
+          [](PyForeignArrays& self, const std::vector<std::string>& fields, bool restore) {
+            self.work(
+                [&](worlds::ForeignArrays& arrays) { arrays.set_constants(fields, restore); });
+          },
+          nb::arg("fields"), nb::arg("restore"),
+          "Writes these fields of the model, which mj_setConst derives, into their arrays. "
+          "restore: also the fields of the data that follow from positions.")
       .def(
           "set_option",
           [](PyForeignArrays& self, const std::string& name, const std::vector<double>& values) {

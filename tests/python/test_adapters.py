@@ -188,6 +188,12 @@ def test_mujoco_warp_is_stepped_by_mujoco(environment, name):
     run(environment(name), Path(__file__).parent / "adapters/mujoco_warp_use.py", ROOT / "docs/mujoco_warp.md")
 
 
+@pytest.mark.parametrize("name", ["mjlab", "warp"])
+@pytest.mark.parametrize("script", ["mujoco_warp_images", "mujoco_warp_constants"])
+def test_mujoco_warp_has_the_images_and_constants_of_mjsense(environment, name, script):
+    run(environment(name), Path(__file__).parent / f"adapters/{script}.py")
+
+
 def test_environments_of_mjlab(environment):
     run(environment("mjlab"), Path(__file__).parent / "adapters/mjlab_use.py")
 

@@ -508,6 +508,134 @@ def test_grids_of_rays_hit_what_plain_mujoco_hits(side):
     assert len({*geoms.tolist()}) > 60
 
 
+SEEN = """
+<mujoco><visual><headlight ambient=".1 .05 0" diffuse=".2 .2 .3" specular=".1 .1 .1"/></visual>
+<asset><material name="glossy" rgba=".6 .4 .2 .3" specular=".8" shininess=".1" emission=".15" reflectance=".9"/></asset><worldbody>
+  <light type="directional" pos="0 0 9" dir="-.48 0 -.64" diffuse=".5 .6 .4" specular=".7 .7 .7" ambient=".02 0 .03"/>
+  <light type="spot" pos="2 -1 4" dir="-.4 .2 -1" cutoff="60" exponent="2" diffuse=".3 .1 .2" specular="0 0 0" attenuation=".8 .1 .02" castshadow="false"/>
+  <geom type="plane" size="0 0 1" rgba=".5 .7 .9 1"/>
+  <camera pos="0 -1 6" xyaxes="1 0 0 0 .97 .24"/>
+  <body pos="0 0 1.5"><freejoint/><geom size=".5" material="glossy" rgba="0 1 0 1"/></body>
+</worldbody></mujoco>"""
+
+
+def unit(v):
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def warp_colors(model, data, rays, points, normals, rgb, specular, exponent, emission, lit):
+    """mujoco_warp's light model: colours of points, [n, 3]. `lit`: 1, or 0.3 where the directional light is shadowed."""
+    head, ambient = model.vis.headlight, model.light_ambient.sum(0)
+    result, gloss = rgb * (emission + head.ambient + ambient), 0
+    lights = [(-unit(data.cam_xmat[0].reshape(3, 3) @ [0, 0, -1]), 1.0, head.diffuse, head.specular, 1.0)]
+    lights.append((-unit(data.light_xdir[0]), 1.0, model.light_diffuse[0], model.light_specular[0], lit))
+    away = data.light_xpos[1] - points
+    distance = np.linalg.norm(away, axis=1, keepdims=True)
+    cosine = -(away / distance) @ data.light_xdir[1][:, None]
+    a = model.light_attenuation[1]
+    strength = (cosine > np.cos(np.deg2rad(60))) * np.maximum(cosine, 0) ** 2 / (a[0] + a[1] * distance + a[2] * distance**2)
+    lights.append((away / distance, strength, model.light_diffuse[1], model.light_specular[1], 1.0))
+    for to_light, strength, diffuse, shine, share in lights:
+        matte = np.maximum((normals * to_light).sum(-1, keepdims=True), 0)
+        half = np.maximum((normals * unit(to_light - rays)).sum(-1, keepdims=True), 0)
+        result = result + rgb * diffuse * matte * strength * share
+        gloss = gloss + (matte > 0) * shine * specular * half**exponent * strength * share
+    return np.clip(result + gloss, 0, 1)
+
+
+@pytest.mark.parametrize(("shadows", "threads"), [(False, 1), (True, 3)])
+def test_images_have_the_colours_of_mujoco_warps_light_model(shadows, threads):
+    model = mujoco.MjModel.from_xml_string(SEEN)
+    data, width, height = mujoco.MjData(model), 40, 28
+    mujoco.mj_forward(model, data)
+    worlds = _core.ForeignArrays(model._address, 2, threads)
+    worlds.run(FORWARD)
+    packed, depth = np.zeros((2, 5 + width * height), np.uint32), np.zeros((2, width * height), np.float32)
+    ids = np.full((2, width * height, 2), 9, np.int32)
+    arrays = (packed.ctypes.data + 20, depth.ctypes.data, ids.ctypes.data)
+    worlds.render([(0, width, height, None, arrays)], (5 + width * height, width * height, 2 * width * height), 7, True, shadows, False, 0xFF102030)
+    assert not packed[:, :5].any()
+    np.testing.assert_array_equal(packed[0], packed[1])
+    rgb = np.stack([packed[1, 5:] >> shift & 255 for shift in (16, 8, 0)], -1).astype(int)
+    half = np.tan(np.deg2rad(model.cam_fovy[0] / 2))
+    x, y = np.meshgrid((np.arange(width) + 0.5) / width * 2 - 1, 1 - (np.arange(height) + 0.5) / height * 2)
+    local = unit(np.stack([x * half * width / height, y * half, -np.ones_like(x)], -1).reshape(-1, 3))
+    rays, eye, middle = local @ data.cam_xmat[0].reshape(3, 3).T, data.cam_xpos[0], data.geom_xpos[1]
+
+    def on_sphere(origin, direction):
+        b, c = (direction * (origin - middle)).sum(-1), ((origin - middle) ** 2).sum(-1) - 0.25
+        return np.where(b * b > c, -b - np.sqrt(np.maximum(b * b - c, 0)), -1)
+
+    sphere, plane = on_sphere(eye, rays), -eye[2] / rays[:, 2]
+    seen, floor = sphere > 0, (sphere < 0) & (plane > 0)
+    assert seen.sum() > 20 < floor.sum()
+    np.testing.assert_allclose(depth[0], np.where(seen, sphere, plane) * -local[:, 2], rtol=1e-5)
+    np.testing.assert_array_equal(ids[1], np.stack([seen, np.full_like(seen, mujoco.mjtObj.mjOBJ_GEOM, int)], -1))
+    points = eye + sphere[seen, None] * rays[seen]
+    wanted = warp_colors(model, data, rays[seen], points, unit(points - middle), np.array([0.6, 0.4, 0.2]), 0.8, 12.8, 0.15, 1.0)
+    assert np.abs(rgb[seen] - np.floor(255 * wanted)).max() <= 1
+    points = eye + plane[floor, None] * rays[floor]
+    away = on_sphere(points, -unit(data.light_xdir[0])) > 0
+    lit = np.where(away & shadows, 0.3, 1.0)[:, None]
+    wanted = warp_colors(model, data, rays[floor], points, np.array([[0, 0, 1.0]]), np.array([0.5, 0.7, 0.9]), 0.5, 64, 0, lit)
+    assert (np.abs(rgb[floor] - np.floor(255 * wanted)).max(-1) <= 1).mean() > 0.99
+    assert away.sum() > 10
+
+
+def test_images_use_the_poses_models_and_pixels_of_the_program():
+    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><camera pos='0 0 4'/><geom size='1' group='1'/><geom size='9' group='4'/></worldbody></mujoco>")
+    worlds = _core.ForeignArrays(model._address, 3, 1)
+    worlds.clear(9, 9)
+    size, pose = np.full((3, 6), 1, np.float32), np.zeros((3, 3), np.float32)
+    size[:, 3:] = 9
+    assert worlds.add("model", "geom_size", size.ctypes.data, "float32", 3, 6)
+    assert worlds.add("data", "cam_xpos", pose.ctypes.data, "float32", 3, 3)
+    worlds.run(FORWARD)
+    assert pose[:, 2].tolist() == [4, 4, 4]
+    size[1, 0], pose[2, 2] = 2, 6
+    depth, rgb = np.zeros((3, 9), np.float32), np.zeros((3, 9), np.uint32)
+    camera = (0, 3, 3, (-0.03, 0.03, 0.02, -0.02), (rgb.ctypes.data, depth.ctypes.data, 0))
+    worlds.render([camera], (9, 9, 0), 1 << 1, False, False, False, 0xFF102030)
+    np.testing.assert_allclose(depth[:, 4], [3, 2, 5], rtol=1e-6)
+    camera = (*camera[:3], (1.0, 1.0, 0.02, -0.02), camera[4])  # pixels next to the sphere
+    worlds.render([camera], (9, 9, 0), 1 << 1, False, False, False, 0xFF102030)
+    assert not depth.any()
+    assert (rgb == 0xFF102030).all()
+
+
+@pytest.mark.parametrize("rows", [1, WORLDS])
+def test_constants_are_those_of_mj_setconst(rows):
+    program = Program()
+    program.throw()
+    outputs = ("body_subtreemass", "body_invweight0", "dof_invweight0")
+    arrays = {name: np.tile(np.ravel(getattr(program.model, name)).astype(np.float32), (rows, 1)) for name in ("body_mass", "body_ipos", *outputs)}
+    for name, array in arrays.items():
+        assert program.add("model", name, array)
+    program.worlds.run(STEP)
+    rng = np.random.default_rng(0)
+    arrays["body_mass"] *= rng.uniform(0.5, 2, arrays["body_mass"].shape).astype(np.float32)
+    arrays["body_ipos"][:, 3:] += rng.uniform(-0.1, 0.1, (rows, 6)).astype(np.float32)
+    before = {name: arrays[name].copy() for name in outputs}
+    poses = program.xpos.copy()
+    program.worlds.set_constants(["body_subtreemass"], False)
+    np.testing.assert_array_equal(arrays["dof_invweight0"], before["dof_invweight0"])
+    np.testing.assert_array_equal(program.xpos, poses)
+    program.worlds.set_constants(["body_invweight0", "dof_invweight0"], True)
+    for row in range(rows):
+        model = mujoco.MjModel.from_xml_string(XML)
+        for name in ("body_mass", "body_ipos"):
+            getattr(model, name)[...] = arrays[name][row].reshape(getattr(model, name).shape)
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        for name in outputs:
+            np.testing.assert_allclose(arrays[name][row], np.ravel(getattr(model, name)), rtol=1e-5, err_msg=name)
+    for world, data in enumerate(program.plain()):  # positions are those of the states
+        mujoco.mj_kinematics(program.model, data)
+        np.testing.assert_allclose(program.xpos[world], data.xpos.ravel(), atol=1e-6)
+    arrays["dof_invweight0"][0, 2] = 7  # what the program writes is derived anew
+    program.worlds.set_constants(["body_invweight0", "dof_invweight0"], False)
+    assert arrays["dof_invweight0"][0, 2] < 7
+
+
 def test_threads_take_turns_and_a_forked_process_is_refused():
     program, alone = Program(2), Program()
     for one in (program, alone):

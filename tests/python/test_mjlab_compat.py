@@ -339,6 +339,80 @@ def test_entities_are_written_and_read_as_in_mjlab():
         _ = arm.data.heading_w
 
 
+HAND = """<mujoco><worldbody><body name="base" pos="0 0 .1"><geom size=".1"/>
+<body name="arm" pos=".2 0 0"><joint name="ball" type="ball"/><geom type="capsule" size=".02" fromto="0 0 0 .3 0 0"/>
+<body name="tip" pos=".3 0 0"><joint name="hinge" axis="0 1 0"/><joint name="slide" type="slide" axis="1 0 0"/>
+<joint name="turn" axis="0 0 1"/><geom size=".03"/><site name="end"/></body></body></body></worldbody>
+<tendon><fixed name="both"><joint joint="hinge" coef="1"/><joint joint="slide" coef="-1"/></fixed></tendon>
+<actuator><position name="servo" joint="hinge" kp="20" kv="1"/><velocity name="speed" joint="slide" kv="3"/><motor name="motor" joint="turn"/>
+<position name="length" tendon="both" kp="5"/><motor name="thrust" site="end" gear="0 0 1 0 0 0"/></actuator></mujoco>"""
+
+
+def test_wrenches_mocap_poses_and_targets_are_written_as_in_mjlab():
+    scene = Scene(SceneCfg(num_envs=WORLDS, entities={
+        "arm": EntityCfg(spec_fn=lambda: mujoco.MjSpec.from_string(ARM)),
+        "hand": EntityCfg(spec_fn=lambda: mujoco.MjSpec.from_string(HAND))}))  # fmt: skip
+    sim = Simulation(WORLDS, SimulationCfg(), scene.compile())
+    arm, hand, rng = scene["arm"], scene["hand"], np.random.default_rng(0)
+    model = mujoco.MjModel.from_xml_string(scene.native.to_xml())
+    plain = mujoco.MjData(model)
+    of = [model.body(f"hand/{name}").id for name in hand.body_names]
+    assert hand.body_names == ("mocap_base", "base", "arm", "tip")
+
+    # Wrenches.
+    forces, torques = rng.normal(size=(2, 2, WORLDS, 4, 3))[:, 0]
+    hand.write_external_wrench_to_sim(like_tensor(forces), like_tensor(torques))
+    hand.write_external_wrench_to_sim(like_tensor(2 * forces[:2, 3:]), None, env_ids=[2, 0], body_ids=[3])
+    forces[[2, 0], 3] = 2 * forces[:2, 3]
+    sim.forward()
+    np.testing.assert_allclose(array(sim.data.xfrc_applied)[:, of], np.concatenate([forces, torques], -1), rtol=1e-6)
+    for world in range(WORLDS):
+        plain.xfrc_applied[of] = np.concatenate([forces, torques], -1)[world]
+        plain.qpos[:], plain.mocap_pos[:], plain.mocap_quat[:] = (array(getattr(sim.data, name))[world] for name in ("qpos", "mocap_pos", "mocap_quat"))
+        mujoco.mj_forward(model, plain)
+        np.testing.assert_allclose(array(sim.data.qacc)[world], plain.qacc, rtol=1e-5, atol=1e-5)
+    with pytest.raises(ValueError, match=r"entity 'hand': a wrench of the shape \(3, 2, 3\) is for 4 bodies"):
+        hand.write_external_wrench_to_sim(like_tensor(forces[:, :2]), None)
+
+    # The pose of an entity without a free joint.
+    pose = np.array([[1, 2, 3, 0, 0, 0, 1.0], [0, 0, 1, 1, 0, 0, 0]])
+    hand.write_mocap_pose_to_sim(like_tensor(pose), env_ids=[0, 2])
+    sim.forward()
+    base = model.body("hand/base").id
+    np.testing.assert_allclose(array(sim.data.xpos)[:, base], [[1, 2, 3.1], [0, 0, 0.1], [0, 0, 1.1]], atol=1e-6)
+    np.testing.assert_allclose(array(sim.data.xquat)[0, base], [0, 0, 0, 1], atol=1e-6)
+    with pytest.raises(ValueError, match="entity 'arm' has no mocap body as its root"):
+        arm.write_mocap_pose_to_sim(like_tensor(pose[:1]))
+    with pytest.raises(ValueError, match="6 numbers of a mocap pose, not 7"):
+        hand.write_mocap_pose_to_sim(like_tensor(pose[:, :6]))
+
+    # Targets: the names of the joints are ball, hinge, slide and turn.
+    hand.set_joint_position_target(like_tensor(np.full((WORLDS, 4), 0.25)))
+    hand.set_joint_velocity_target(like_tensor([[0.5]]), joint_ids=[2], env_ids=[1])
+    hand.set_joint_effort_target(like_tensor([[7.0, 8.0]]), joint_ids=[1, 3], env_ids=[0])
+    hand.set_tendon_len_target(like_tensor([[0.1], [0.2], [0.3]]))
+    hand.set_site_effort_target(like_tensor([[3.0]]), env_ids=[2])
+    arm.set_joint_effort_target(like_tensor([[-1.0, 9.0]]), env_ids=[1])
+    assert not array(sim.data.ctrl).any()
+    scene.write_data_to_sim()
+    wanted = [[0, 0.25, 0, 8, 0.1, 0], [-1, 0.25, 0.5, 0, 0.2, 0], [0, 0.25, 0, 0, 0.3, 3]]
+    np.testing.assert_allclose(array(sim.data.ctrl), wanted, rtol=1e-6)
+    assert array(hand.data.joint_pos_target).shape == (WORLDS, 4)
+    with pytest.raises(ValueError, match="entity 'hand': 3 numbers of joint_vel_target for 4 elements"):
+        hand.set_joint_velocity_target(like_tensor(np.zeros((WORLDS, 3))))
+    scene.reset([1])
+    scene.write_data_to_sim()
+    np.testing.assert_allclose(array(sim.data.ctrl), [wanted[0], [0] * 6, wanted[2]], rtol=1e-6)
+
+    # A ball joint has four numbers in qpos and three in qvel.
+    position = rng.normal(size=(WORLDS, 7))
+    position[:, :4] /= np.linalg.norm(position[:, :4], axis=1)[:, None]
+    speed = rng.normal(size=(WORLDS, 6))
+    hand.write_joint_state_to_sim(like_tensor(position), like_tensor(speed))
+    np.testing.assert_allclose(array(sim.data.qpos)[:, -7:], position, rtol=1e-6)
+    np.testing.assert_allclose(array(hand.data.joint_vel), speed, rtol=1e-6)
+
+
 def test_velocities_of_an_entity_with_two_trees_of_bodies():
     text = ARM.replace("</worldbody>", "<body name='lever' pos='0 2 0'><joint name='lever' axis='1 0 0'/><geom size='.1' pos='0 .4 0'/></body></worldbody>")
     scene = Scene(SceneCfg(num_envs=1, entities={"arm": EntityCfg(spec_fn=lambda: mujoco.MjSpec.from_string(text))}))

@@ -6,10 +6,10 @@
     data = mujoco_warp.put_data(mj_model, mj_data, nworld=1024)
     mujoco_warp.step(model, data)
 
-``step``, ``forward``, ``step1``, ``step2``, ``reset_data`` and ``rays`` then compute all worlds with MuJoCo and mjsense, on all
-cores, if the arrays are on Warp's CPU device, and write the results into the arrays of the data. On CUDA devices, and for models
-with callbacks or with ``opt.run_collision_detection=False``, they are mujoco_warp's own. All other functions are mujoco_warp's
-own everywhere, and read these arrays.
+``step``, ``forward``, ``step1``, ``step2``, ``reset_data``, ``set_const``, ``rays`` and ``render`` then compute all worlds with
+MuJoCo and mjsense, on all cores, if the arrays are on Warp's CPU device, and write the results into the arrays of the data, the
+model or the render context. On CUDA devices, and for models with callbacks or with ``opt.run_collision_detection=False``, they
+are mujoco_warp's own. All other functions are mujoco_warp's own everywhere, and read these arrays.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense import _core
+from mjsense.compat import _warp_rendering
 from mjsense.sim import foreign_model
 from mjsense.sim.attached import _STATE
 
@@ -45,8 +46,10 @@ _TESTED = ("3.11", "4.0")
 
 _CALLS = {"step": 0, "forward": 1, "step1": 2, "step2": 3}
 _RESET = 4
-_OWN = {name: getattr(mujoco_warp, name) for name in (*_CALLS, "reset_data", "ray", "rays", "refit_bvh", "put_model")}
-"""mujoco_warp's own functions."""
+_CONSTANTS = ("set_const", "set_const_0", "set_const_fixed")
+_OTHERS = ("reset_data", "ray", "rays", "refit_bvh", "render", "put_model")
+_OWN = {name: getattr(mujoco_warp, name) for name in (*_CALLS, *_CONSTANTS, *_OTHERS) if hasattr(mujoco_warp, name)}
+"""mujoco_warp's own functions. Older and newer series lack some."""
 _capture_launch = wp.capture_launch
 
 _OTHER = ("qLD", "qLDiagInv", "qLU", "qH", "qHDiagInv")
@@ -69,6 +72,20 @@ _OPTIONS = (
 
 _GEOMETRY = ("mesh_", "hfield_", "oct_", "tex_", "flex")
 """Beginnings of the names of the model's arrays that are large, and must not be changed."""
+
+_FIXED = ("body_subtreemass",)
+_BOUNDS = ("geom_aabb", "geom_rbound", "geom_size")  # of mujoco_warp 4.0
+_KINEMATICS = (
+    "tendon_length0",
+    "eq_data",
+    *("cam_pos0", "cam_poscom0", "cam_mat0"),
+    *("light_pos0", "light_poscom0", "light_dir0"),
+)
+_INERTIA = ("dof_invweight0", "body_invweight0", "tendon_invweight0", "actuator_acc0")
+"""What mujoco_warp's ``set_const`` derives."""
+
+_CHECKED_BYTES = 1 << 16
+"""Of the geometry, compared in each call with that of put_model(), in turn."""
 
 _models: dict[int, Any] = {}
 """By the id of a ``mujoco_warp.Model``: a copy of the ``mujoco.MjModel`` that it was made of."""
@@ -162,6 +179,10 @@ class Worlds:
         self._options = {name: int(getattr(source.opt, name)) for name in _OPTIONS if hasattr(model.opt, name)}
         self._others: dict[str, tuple[np.ndarray, np.ndarray]] = {}
         """Arrays of the model that MuJoCo does not have in this form, and their values at the last step."""
+        self._geometry: dict[str, bytes] = {}
+        """Arrays of the model that are large and must not be changed, as they were at first."""
+        self._parts_of_geometry: list[tuple[str, memoryview, bytes]] = []
+        self._next = 0
         self._set_options()
         self._link()
 
@@ -187,9 +208,12 @@ class Worlds:
         self._parts: list[tuple[dict[str, Any], tuple[Any, ...]]] = [({}, (None,))]  # an error leaves what no program has
         self._arrays.clear(data.naconmax, data.njmax)
         others: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+        self._parts_of_geometry = []
         self.shown, self.left = [], []
+        self._linked: set[str] = set()
         parts = [("", "data", data), ("contact.", "contact", data.contact), ("efc.", "data", data.efc)]
         for prefix, kind, part in parts:
+            self._check_arrays("data", prefix, part)
             for name in _array_fields(part):
                 rows = part.worldid.shape[0] if kind == "contact" else data.nworld
                 field = f"efc_{name}" if prefix == "efc." else name
@@ -199,14 +223,18 @@ class Worlds:
             self.left.remove("nacon")
             self.shown.append("nacon")
         for prefix, part in (("", self.model), ("opt.", self.model.opt)):
+            self._check_arrays("model", prefix, part)
             hints = {field.name: field.type for field in dataclasses.fields(part)}
             for name in _array_fields(part):
-                if name.startswith(_GEOMETRY):
-                    continue
                 array = getattr(part, name)
+                if name.startswith(_GEOMETRY):
+                    self._keep_geometry(prefix + name, array)
+                    continue
                 by_world = getattr(hints[name], "shape", ("",))[:1] == ("*",)
                 rows = array.shape[0] if by_world else 1
-                if not self._add("model", part, name, prefix + name, rows, False) and by_world and array.size:
+                if self._add("model", part, name, prefix + name, rows, False):
+                    self._linked.add(name)
+                elif by_world and array.size:
                     values = array.numpy()
                     known = self._others.get(prefix + name)
                     before = known[1] if known else self._first(prefix + name, values)
@@ -216,6 +244,54 @@ class Worlds:
         self._parts = [
             (vars(part), (*vars(part).values(),)) for part in (data, data.contact, data.efc, self.model, self.model.opt)
         ]
+
+    def _keep_geometry(self, name: str, array: Any) -> None:
+        if not array.size or not array.device.is_cpu or not array.is_contiguous or array.dtype in (wp.uint64, wp.Texture2D):
+            return
+        now = np.ascontiguousarray(array.numpy()).data.cast("B")
+        before = self._geometry.setdefault(name, bytes(now))
+        if len(now) != len(before):
+            raise ValueError(f"{name} cannot be changed after put_model(): it had {len(before)} bytes, and has {len(now)}")
+        for first in range(0, len(now), _CHECKED_BYTES):
+            part = slice(first, first + _CHECKED_BYTES)
+            self._parts_of_geometry.append((name, now[part], before[part]))
+
+    def _check_geometry(self) -> None:
+        """Compares the next part of the geometry with what it was."""
+        compared = 0
+        for _ in self._parts_of_geometry:
+            self._next = (self._next + 1) % len(self._parts_of_geometry)
+            name, now, before = self._parts_of_geometry[self._next]
+            if now.tobytes() != before:
+                raise ValueError(f"{name} cannot be changed after put_model(): make the model anew")
+            compared += len(now)
+            if compared >= _CHECKED_BYTES:
+                break
+
+    def _size(self, name: str) -> int | None:
+        """A size of the data or the model, for example nq; None if there is no such one."""
+        return getattr(self._data(), name, getattr(self.model, name, None))
+
+    def _check_arrays(self, owner: str, prefix: str, part: Any) -> None:
+        """Raises ValueError if a program has replaced an array by one of another size or type."""
+        for field in dataclasses.fields(part):
+            array: Any = getattr(part, field.name)
+            wanted: Any = field.type
+            if not isinstance(array, wp.array) or not isinstance(getattr(wanted, "shape", None), tuple):
+                continue
+            if prefix + field.name in ("efc.J", *_OTHER):  # which are not written, and have several forms
+                continue
+            rows = owner == "model" and wanted.shape[:1] == ("*",) and array.shape[0] == 0 and all(array.shape[1:])
+            if not array.size and field.name not in _STATE and not rows:
+                continue  # mujoco_warp does not allocate what the model does not need
+            named = [size if isinstance(size, int) else self._size(size) for size in wanted.shape]
+            same = len(named) == array.ndim and all(size is None or size == n for size, n in zip(named, array.shape))
+            if not same or rows:
+                shape = tuple("*" if size is None else size for size in named)
+                raise ValueError(f"{prefix}{field.name} of the {owner} has the shape {array.shape}, expected {shape}")
+            if _elements(array.dtype) != _elements(wanted.dtype):
+                found, expected = array.dtype.__name__, wanted.dtype.__name__
+                raise ValueError(f"{prefix}{field.name} of the {owner} has elements of {found}, expected {expected}")
 
     def _add(self, kind: str, part: Any, name: str, field: str, rows: int, state: bool) -> bool:
         array = getattr(part, name)
@@ -232,16 +308,46 @@ class Worlds:
 
     def run(self, call: int, mask: int = 0) -> None:
         """Calls MuJoCo's function for all worlds. `mask`: address of an array of bools; of a reset."""
+        self._update()
+        self._arrays.run(call, mask)
+
+    def set_constants(self, fields: tuple[str, ...], restore: bool) -> bool:
+        """Derives these fields of the model; False if one of them is not linked."""
+        self._update()
+        if not self._linked.issuperset(fields):
+            return False
+        self._arrays.set_constants([*fields], restore)
+        return True
+
+    def render(self, rc: Any) -> None:
+        """Draws the images of the render context."""
+        for name in ("rgb_data", "depth_data", "seg_data"):
+            array = getattr(rc, name)
+            if array.shape[0] != self._num_worlds or not array.device.is_cpu or (array.size and not array.is_contiguous):
+                raise ValueError(
+                    f"render(): {name} of the render context is for {array.shape[0]} worlds on {array.device}, and the data has "
+                    f"{self._num_worlds} on the CPU: make the context with nworld={self._num_worlds}"
+                )
+        self._update()
+        rc.seg_data.numpy()[...] = -1
+        groups = sum(1 << group for group in _warp_rendering.geom_groups(self._source, rc))
+        settings = (bool(rc.use_textures), bool(rc.use_shadows), bool(rc.render_skybox), int(rc.background_color))
+        cameras = _warp_rendering.cameras_of(rc)
+        if cameras:
+            self._arrays.render(cameras, _warp_rendering.row_lengths(rc), groups, *settings)
+
+    def _update(self) -> None:
+        """Takes over arrays and options that the program has replaced."""
         for attributes, values in self._parts:
             if len(attributes) != len(values) or not all(map(operator.is_, attributes.values(), values)):
                 self._set_options()
                 self._link()
                 break
+        self._check_geometry()
         for name, (now, before) in self._others.items():
             if now.tobytes() != before.tobytes():
                 self._changed(name, now)
                 before[...] = now
-        self._arrays.run(call, mask)
 
     def cast(self, query: dict[str, Any]) -> None:
         """Casts the rays of a call of ``mujoco_warp.rays``."""
@@ -292,6 +398,12 @@ class Worlds:
         if name != "opt.impratio_invsqrt":
             raise ValueError(f"{name} cannot be changed after put_model()")
         self._arrays.set_option("opt.impratio", (now.astype(float) ** -2).tolist())
+
+
+def _elements(dtype: Any) -> tuple[Any, int]:
+    """The kind of the numbers of a Warp type, and the bytes of an element."""
+    kind = getattr(dtype, "_wp_scalar_type_", dtype)
+    return {bool: wp.bool, int: wp.int32, float: wp.float32}.get(kind, kind), wp.types.type_size_in_bytes(dtype)
 
 
 def _array_fields(part: Any) -> list[str]:
@@ -398,21 +510,92 @@ def _rays(*args: Any, **kwargs: Any) -> None:
     if _casts(model, data):
         _do(lambda: _worlds[id(data)].cast(dict(query.arguments)))
     else:
+        if query.arguments["rc"] is not None:
+            _OWN["refit_bvh"](model, data, query.arguments["rc"])  # which _refit_bvh() may not have done
         _OWN["rays"](*args, **kwargs)
 
 
 @functools.wraps(_OWN["ray"])
 def _ray(*args: Any, **kwargs: Any) -> Any:
     call = inspect.signature(_OWN["ray"]).bind(*args, **kwargs).arguments
-    if call.get("rc") is not None and not call["rc"].nrender and _casts(call["m"], call["d"]):
+    if call.get("rc") is not None and _needs_no_bvh(call["m"], call["d"], call["rc"]):
         _OWN["refit_bvh"](call["m"], call["d"], call["rc"])  # which _refit_bvh() has not done
     return _OWN["ray"](*args, **kwargs)
 
 
 @functools.wraps(_OWN["refit_bvh"])
 def _refit_bvh(m: Any, d: Any, rc: Any) -> None:
-    if rc.nrender or not _casts(m, d):
+    if not _needs_no_bvh(m, d, rc):
         _OWN["refit_bvh"](m, d, rc)
+
+
+def _needs_no_bvh(model: Any, data: Any, rc: Any) -> bool:
+    return _draws(model, data, rc) if rc.nrender else _casts(model, data)
+
+
+_drawn: dict[int, bool] = {}
+"""By the id of a render context: whether mjsense draws it."""
+
+
+def _draws(model: Any, data: Any, rc: Any) -> bool:
+    """Whether the images of this render context are mjsense's."""
+    if not _on_cpu(model, data) or id(model) not in _models:
+        return False
+    known = _drawn.get(id(rc))
+    if known is None:
+        weakref.finalize(rc, _drawn.pop, id(rc), None)
+        known = _drawn[id(rc)] = not _warp_rendering.reason_to_leave(model, _models[id(model)], rc)
+    return known
+
+
+@functools.wraps(_OWN["render"])
+def _render(m: Any, d: Any, rc: Any) -> None:
+    if _draws(m, d, rc):
+        _do(lambda: worlds_of(m, d).render(rc))
+    else:
+        _OWN["render"](m, d, rc)
+
+
+def _set_const(name: str) -> Callable[..., None]:
+    own = _OWN[name]
+    arguments = inspect.signature(own)
+
+    @functools.wraps(own)
+    def call(*args: Any, **kwargs: Any) -> None:
+        given = arguments.bind(*args, **kwargs)
+        given.apply_defaults()
+        model, data = given.arguments["m"], given.arguments["d"]
+        fields = _fields(name, given.arguments.get("groups"))
+        fields = tuple(field for field in fields if getattr(model, field).size)
+        if not _on_cpu(model, data) or id(model) not in _models or _has_placeholders(name, model):
+            return own(*args, **kwargs)
+
+        def run() -> None:
+            if not worlds_of(model, data).set_constants(fields, given.arguments.get("restore", False)):
+                own(*args, **kwargs)
+
+        _do(run)
+
+    return call
+
+
+def _fields(name: str, groups: int | None) -> tuple[str, ...]:
+    """What this function of mujoco_warp derives; `groups` of its version 4.0."""
+    if groups is not None:  # SetConstGroup
+        parts = ((1, (*_FIXED, *_BOUNDS)), (2, _KINEMATICS), (4, _INERTIA))
+        return tuple(field for bit, part in parts if groups & bit for field in part)
+    bounds = _BOUNDS if hasattr(mujoco_warp, "SetConstGroup") else ()
+    fixed, zero = (*_FIXED, *bounds), (*_KINEMATICS, *_INERTIA)
+    return {"set_const_fixed": fixed, "set_const_0": zero}.get(name, (*fixed, *zero))
+
+
+def _has_placeholders(name: str, model: Any) -> bool:
+    """Whether an actuator has a damping ratio, or a tendon no spring length, which mujoco_warp's function would replace."""
+    if hasattr(mujoco_warp, "SetConstGroup"):
+        return False
+    ratio = model.actuator_biasprm.size and (model.actuator_biasprm.numpy()[..., 2] > 0).any()
+    springs = name == "set_const" and model.tendon_lengthspring.size and (model.tendon_lengthspring.numpy() < 0).any()
+    return bool(name != "set_const_fixed" and (ratio or springs))
 
 
 @functools.wraps(_OWN["put_model"])
@@ -426,7 +609,9 @@ def _put_model(mjm: Any, *args: Any, **kwargs: Any) -> Any:
 
 _NEW = {
     **{name: _call(name) for name in _CALLS},
+    **{name: _set_const(name) for name in _CONSTANTS if name in _OWN},
     "reset_data": _reset_data,
+    "render": _render,
     "ray": _ray,
     "rays": _rays,
     "refit_bvh": _refit_bvh,

@@ -22,17 +22,27 @@ ForeignRays::ForeignRays(const worlds::Worlds& worlds)
       pool_(worlds.threads()),
       scratch_(pool_.size(), RayScratch(scene_.num_objects())) {}
 
-void ForeignRays::cast(worlds::Worlds& worlds, const ForeignRaysQuery& query) {
+void ForeignRays::update(worlds::Worlds& worlds, const Also& also) {
+  struct Pass {
+    RayScene* scene;
+    const Also* also;
+  } pass{&scene_, &also};
   worlds::apply_ordered(
       worlds.batch(), nullptr, 0,
-      [](const mjModel* m, mjData* d, int w, void* scene) {
+      [](const mjModel* m, mjData* d, int w, void* argument) {
+        const auto& [scene, also] = *static_cast<const Pass*>(argument);
         World world{};
         world.id = w;
         world.model = m;
         world.data = d;
-        static_cast<RayScene*>(scene)->update(world);
+        scene->update(world);
+        if (*also) (*also)(m, w);
       },
-      &scene_, 0);
+      &pass, 0);
+}
+
+void ForeignRays::cast(worlds::Worlds& worlds, const ForeignRaysQuery& query) {
+  update(worlds);
   const int packets = (query.count + kPacket - 1) / kPacket,
             chunks = (packets + kChunk - 1) / kChunk;
   pool_.run_near(worlds.size() * chunks, [&](int item, int thread) {

@@ -5,6 +5,7 @@
 #include <mujoco/mujoco.h>
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -28,9 +29,16 @@ struct ForeignRaysQuery {
 
 class ForeignRays {
  public:
+  // `worlds` are those of all later calls.
   ForeignRays(const worlds::Worlds& worlds);
-  // `worlds` are those of the constructor, whose poses are current.
+  // Casts rays into the worlds, whose poses are current.
   void cast(worlds::Worlds& worlds, const ForeignRaysQuery& query);
+  // Copies the worlds' poses to scene(), for images. `also` is called with each world's model, by many
+  // threads.
+  using Also = std::function<void(const mjModel* model, int world)>;
+  void update(worlds::Worlds& worlds, const Also& also = {});
+  const RayScene& scene() const { return scene_; }
+  ThreadPool& pool() { return pool_; }
 
  private:
   void cast_packets(int world, int begin, int end, const ForeignRaysQuery& query,

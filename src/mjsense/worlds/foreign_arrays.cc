@@ -28,7 +28,43 @@ constexpr std::string_view kReset[] = {"qacc", "act_dot", "sensordata", "energy"
                                        "ne",   "nf",      "nl",         "nefc"};
 // Fields of constraints that mj_step1 does not compute.
 constexpr std::string_view kSolved[] = {"efc_state", "efc_force"};
-constexpr std::string_view kPoses[] = {"geom_xpos", "geom_xmat"};
+// Fields that kPositions shows.
+constexpr std::string_view kPositions[] = {"xpos",
+                                           "xquat",
+                                           "xmat",
+                                           "xipos",
+                                           "ximat",
+                                           "xanchor",
+                                           "xaxis",
+                                           "geom_xpos",
+                                           "geom_xmat",
+                                           "site_xpos",
+                                           "site_xmat",
+                                           "cam_xpos",
+                                           "cam_xmat",
+                                           "light_xpos",
+                                           "light_xdir",
+                                           "subtree_com",
+                                           "cdof",
+                                           "cinert",
+                                           "flexvert_xpos",
+                                           "flexedge_J",
+                                           "flexedge_length",
+                                           "ten_wrapadr",
+                                           "ten_wrapnum",
+                                           "ten_J",
+                                           "ten_length",
+                                           "wrap_obj",
+                                           "wrap_xpos",
+                                           "actuator_length",
+                                           "moment_rownnz",
+                                           "moment_rowadr",
+                                           "moment_colind",
+                                           "actuator_moment",
+                                           "crb",
+                                           "M"};
+constexpr std::string_view kPoses[] = {"geom_xpos", "geom_xmat",  "cam_xpos",
+                                       "cam_xmat",  "light_xpos", "light_xdir"};
 
 struct ContactPlace {
   std::string_view name;
@@ -137,6 +173,7 @@ bool ForeignArrays::add_data(std::string_view field, const ArrayView& rows, bool
                      .contact_ids = field == "efc_id",
                      .solved = std::ranges::count(kSolved, field) > 0,
                      .poses = std::ranges::count(kPoses, field) > 0,
+                     .positions = std::ranges::count(kPositions, field) > 0,
                      .pointer = found->pointer,
                      .rows = rows.data,
                      .row_bytes = static_cast<std::size_t>(rows.strides[0]),
@@ -242,6 +279,7 @@ void ForeignArrays::take_shown(mjData* d, int w, bool poses_only) const {
 }
 
 void ForeignArrays::take_poses() {
+  take_model();
   apply([](const mjModel*, mjData* d, int w, void* argument) {
     static_cast<const ForeignArrays*>(argument)->take_shown(d, w, true);
   });
@@ -251,12 +289,14 @@ void ForeignArrays::show(const mjData* d, int w) {
   for (Field& f : fields_) {
     if (call_ == RawCall::kReset && !f.reset) continue;
     if (call_ == RawCall::kStep1 && f.solved) continue;
+    if (call_ == RawCall::kPositions && !f.positions) continue;
     const std::int64_t n = f.constraints ? std::min(f.count, d->nefc) : f.count;
     std::byte* row = f.rows + w * f.row_bytes;
     show_elements(f.pointer(d), f.type, row, f.dtype, n);
     if (f.input)
       std::memcpy(f.seen.data() + w * n * dtype_size(f.dtype), row, n * dtype_size(f.dtype));
   }
+  if (call_ == RawCall::kPositions) return;
   contacts_[w].assign(d->contact, d->contact + d->ncon);
   written_first_contact_[w] = 0;
   num_constraints_[w] = d->nefc;
@@ -318,6 +358,20 @@ void ForeignArrays::step_in_scratch(const mjModel* m, mjData* d, int w) {
   orders_before(this);
 }
 
+// Computes them in another mjData, which has the world's state only. Poses that rays read are carried
+// over by take_poses().
+void ForeignArrays::compute_positions(const mjModel* m, mjData* d, int w) {
+  mjData* s = borrowed_[w] = scratch_.borrow().release();
+  mj_copyState(m, d, s, mjSTATE_INTEGRATION);
+  mj_fwdKinematics(m, s);
+  mj_makeM(m, s);
+  mj_factorM(m, s);
+  mj_transmission(m, s);
+  show(s, w);
+  borrowed_[w] = nullptr;
+  const ScratchData::Loan returned(s, ScratchData::Release{&scratch_});
+}
+
 // A world whose state is not finite: MuJoCo would find contacts between all its geoms. Its state stays,
 // and its results are NaN.
 void ForeignArrays::show_diverged(const mjModel* m, mjData* d, int w) {
@@ -369,6 +423,10 @@ void ForeignArrays::run_world(const mjModel* m, mjData* d, int w, void* argument
     case RawCall::kReset:
       mj_resetData(m, d);
       break;
+    case RawCall::kPositions:
+      self.compute_positions(m, d, w);
+      scene::drop_warnings(false);
+      return orders_before(argument);
   }
   self.scratched_[w] = 0;
   self.current_[w] = self.call_ == RawCall::kForward || self.call_ == RawCall::kStep1;
@@ -402,7 +460,11 @@ bool ForeignArrays::write_model(std::vector<Written>& written, std::vector<int>&
     }
   }
   for (int w = 0; w < num_worlds; ++w) {
-    if (changed[w]) check_element_indices(worlds_.model_of(w));
+    if (!changed[w]) continue;
+    for (auto& [fields, worlds] : derived_) worlds[w] = 0;
+    check_element_indices(worlds_.model_of(w));
+  }
+  for (int w = 0; w < num_worlds; ++w) {
     if (derives[w]) derive.push_back(w);
   }
   return !written.empty();
@@ -411,15 +473,15 @@ bool ForeignArrays::write_model(std::vector<Written>& written, std::vector<int>&
 // Takes the program's model. The worlds keep theirs if it has a value that they cannot have.
 void ForeignArrays::take_model() {
   std::vector<Written> written;
-  std::vector<int> derive;
+  std::vector<int> derived;
   try {
-    if (!write_model(written, derive)) return;
+    if (!write_model(written, derived)) return;
     current_.assign(worlds_.size(), 0);
     worlds_.model_changed();
-    if (!derive.empty()) set_constants(derive);
+    if (!derived.empty()) derive(derived, {});
   } catch (...) {
     for (const Written& one : written) std::ranges::copy(one.before, one.place);
-    if (!derive.empty()) set_constants(derive);
+    if (!derived.empty()) derive(derived, {});
     throw;
   }
   for (ModelField& f : model_fields_) {
@@ -430,8 +492,8 @@ void ForeignArrays::take_model() {
 }
 
 // Makes MuJoCo derive the values that the program's model does not have (bounding volumes, which frames
-// are equal). Those that it has are its own, until it computes them itself.
-void ForeignArrays::set_constants(const std::vector<int>& ids) {
+// are equal). Those that it has are its own, except those of `released`.
+void ForeignArrays::derive(const std::vector<int>& ids, std::span<const std::string> released) {
   mjBatch* batch = worlds_.batch();
   struct Kept {
     std::byte* rows;
@@ -440,7 +502,7 @@ void ForeignArrays::set_constants(const std::vector<int>& ids) {
   };
   std::vector<Kept> kept;
   for (const ModelField& f : model_fields_) {
-    if (!set_const_use(f.name).out) continue;
+    if (!set_const_use(f.name).out || std::ranges::count(released, f.name) > 0) continue;
     int size = 0, element = 0;
     auto* rows = static_cast<std::byte*>(mjb_expand(batch, f.name.c_str(), &size, &element));
     if (!rows) continue;
@@ -458,6 +520,47 @@ void ForeignArrays::set_constants(const std::vector<int>& ids) {
     if (*mjb_error(batch, w))
       throw ValueError(
           fmt::format("MuJoCo cannot use the model of world {}: {}", w, mjb_error(batch, w)));
+  }
+}
+
+void ForeignArrays::set_constants(std::span<const std::string> fields, bool restore) {
+  take_model();
+  std::vector<std::uint8_t>& derived = derived_[{fields.begin(), fields.end()}];
+  derived.resize(worlds_.size());
+  std::vector<int> ids;
+  for (int w = 0; w < worlds_.size(); ++w)
+    if (!derived[w]) ids.push_back(w);
+  if (!ids.empty()) {
+    // MuJoCo writes the values of each world where it has its own.
+    for (const ModelField& f : model_fields_)
+      if (f.num_rows > 1 && std::ranges::count(fields, f.name) > 0)
+        mjb_expand(worlds_.batch(), f.name.c_str(), nullptr, nullptr);
+    derive(ids, fields);
+    current_.assign(worlds_.size(), 0);
+    worlds_.model_changed();
+    for (ModelField& f : model_fields_)
+      if (std::ranges::count(fields, f.name) > 0) show_model(f);
+    derived.assign(worlds_.size(), 1);
+  }
+  if (!restore) return;
+  call_ = RawCall::kPositions;
+  apply(run_world);
+}
+
+// Writes the worlds' values of a field into the rows of its array. Worlds that share a row have its values.
+void ForeignArrays::show_model(ModelField& f) {
+  int size = 0, element = 0;
+  auto* rows = static_cast<std::byte*>(
+      const_cast<void*>(mjb_expanded(worlds_.batch(), f.name.c_str(), &size, &element)));
+  const std::size_t own = static_cast<std::size_t>(size) * element,
+                    bytes = f.count * dtype_size(f.dtype);
+  for (int row = 0; row < f.num_rows; ++row) {
+    const void* values = rows ? rows + own * row : model_values(*worlds_.model(), f.name);
+    std::byte* seen = f.seen.data() + row * bytes;
+    show_elements(values, f.type, seen, f.dtype, f.count);
+    std::memcpy(const_cast<std::byte*>(f.rows) + row * f.row_bytes, seen, bytes);
+    for (int w = row + f.num_rows; rows && w < worlds_.size(); w += f.num_rows)
+      std::memcpy(rows + own * w, rows + own * row, own);
   }
 }
 

@@ -12,6 +12,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,8 +24,9 @@
 
 namespace mjsense::worlds {
 
-// MuJoCo's function that is called for each world.
-enum class RawCall { kStep, kForward, kStep1, kStep2, kReset };
+// MuJoCo's function that is called for each world. kPositions: those that compute what follows from
+// positions, without collisions.
+enum class RawCall { kStep, kForward, kStep1, kStep2, kReset, kPositions };
 
 class ForeignArrays {
  public:
@@ -60,7 +63,13 @@ class ForeignArrays {
   // RuntimeError if MuJoCo raises an error in a world.
   void run(RawCall call, const bool* mask = nullptr);
 
-  // Takes the poses of geoms that the program has written or that a reset has left, for rays.
+  // Derives values of the model from others with mj_setConst, and writes those of `fields` into their
+  // arrays; all others are kept. `restore`: also writes what depends on positions, for the states and the
+  // new model. Row r of an array is that of world r.
+  void set_constants(std::span<const std::string> fields, bool restore);
+
+  // Takes the model and the poses of geoms, cameras and lights that the program has written or that a
+  // reset has left, for rays and images.
   void take_poses();
 
  private:
@@ -72,7 +81,8 @@ class ForeignArrays {
     bool control;       // positions and velocities do not depend on it
     bool contact_ids;   // of contacts among those of all worlds
     bool solved;        // of constraints: a result of the solver
-    bool poses;         // of geoms
+    bool poses;         // of geoms, cameras or lights
+    bool positions;     // follows from positions, without collisions
     const void* (*pointer)(const mjData*);
     std::byte* rows;
     std::size_t row_bytes;        // distance of two rows
@@ -100,6 +110,8 @@ class ForeignArrays {
   bool take(mjData* d, int w);
   void take_shown(mjData* d, int w, bool poses_only) const;
   void step_in_scratch(const mjModel* m, mjData* d, int w);
+  void compute_positions(const mjModel* m, mjData* d, int w);
+  void show_model(ModelField& field);
   void show(const mjData* d, int w);
   void show_diverged(const mjModel* m, mjData* d, int w);
   void show_contacts(const mjModel* m, int w);
@@ -111,7 +123,7 @@ class ForeignArrays {
   };
   void take_model();
   bool write_model(std::vector<Written>& written, std::vector<int>& derive);
-  void set_constants(const std::vector<int>& ids);
+  void derive(const std::vector<int>& ids, std::span<const std::string> released);
   void apply(mjfBatchFunc function);
   void check_capacity() const;
 
@@ -130,6 +142,8 @@ class ForeignArrays {
   std::vector<mjData*> borrowed_;  // by world; not null after a MuJoCo error
   // By world: positions and velocities are those of the state, so that a step need not compute them.
   std::vector<std::uint8_t> current_;
+  // By the fields of set_constants(), by world: it has derived them since the model changed.
+  std::map<std::vector<std::string>, std::vector<std::uint8_t>> derived_;
   std::vector<std::uint8_t> scratched_;  // by world: its mjData has only the state of the last step
   RawCall call_ = RawCall::kStep;
   const bool* mask_ = nullptr;

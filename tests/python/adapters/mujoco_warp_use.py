@@ -183,6 +183,39 @@ linked = again[1].xpos
 again[1].xpos = wp.zeros((WORLDS, 2 * MODEL.nbody), dtype=wp.vec3)[:, ::2]
 raises(ValueError, "xpos is not contiguous", lambda: mjw.step(*again))
 again[1].xpos = linked
+for part, name, array, text in (
+    (again[1], "qpos", wp.zeros((WORLDS, MODEL.nq + 1), dtype=float), r"qpos of the data has the shape \(8, 17\), expected \(8, 16\)"),
+    (again[1], "qpos", wp.zeros((WORLDS // 2, MODEL.nq * 2), dtype=float), r"qpos of the data has the shape \(4, 32\), expected"),
+    (again[1], "qvel", wp.zeros((WORLDS, MODEL.nv), dtype=wp.float64), "qvel of the data has elements of float64, expected float32"),
+    (again[1], "sensordata", wp.zeros((WORLDS, 1), dtype=float), r"sensordata of the data has the shape \(8, 1\), expected"),
+    (again[1].contact, "dist", wp.zeros(3, dtype=float), r"contact\.dist of the data has the shape \(3,\), expected \(320,\)"),
+    (again[0], "body_mass", wp.zeros((1, 3), dtype=float), r"body_mass of the model has the shape \(1, 3\), expected \('\*', 6\)"),
+    (again[0], "body_mass", wp.zeros((0, 6), dtype=float), r"body_mass of the model has the shape \(0, 6\)"),
+):
+    kept = getattr(part, name)
+    setattr(part, name, array)
+    raises(ValueError, text, lambda: mjw.step(*again))
+    raises(ValueError, text, lambda: mjw.step(*again))  # and no later step uses it
+    setattr(part, name, kept)
+    mjw.step(*again)
+
+# Geometry that a program changes in place is found within as many steps as it has parts of 64 KB.
+points = " ".join(f"{x} {y} {z}" for x in (-1, 1) for y in (-1, 1) for z in (-1, 1))
+heights = "".join(f'<hfield name="h{i}" nrow="150" ncol="150" size="1 1 1 1"/>' for i in range(2))
+shaped = mujoco.MjModel.from_xml_string(f"""<mujoco><asset><mesh name="cube" vertex="{points}"/>{heights}</asset><worldbody>
+    <geom type="hfield" hfield="h0"/><geom type="hfield" hfield="h1"/><body pos="0 0 9"><freejoint/><geom type="mesh" mesh="cube"/></body>
+    </worldbody></mujoco>""")
+for name in ("mesh_vert", "hfield_data"):
+    shapes = mjw.put_model(shaped), mjw.put_data(shaped, mujoco.MjData(shaped), nworld=2)
+    for _ in range(12):
+        mjw.step(*shapes)
+    getattr(shapes[0], name).numpy().ravel()[-1] += 0.5
+    raises(ValueError, f"{name} cannot be changed after put_model", lambda shapes=shapes: [mjw.step(*shapes) for _ in range(12)])
+shapes = None
+version = compat.importlib.metadata.version
+compat.importlib.metadata.version = lambda name: "3.10.2"
+raises(ImportError, r"is tested with mujoco-warp 3\.11 to 4\.0, and 3\.10\.2 is installed", compat.use)
+compat.importlib.metadata.version = version
 
 # The worlds use what is changed between put_model() and the first step, in place, and with new arrays for each world.
 changed = copy.copy(MODEL)

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from mjsense.compat.mjlab._data import Data
+from mjsense.compat.mjlab._targets import NAMES, Targets
 from mjsense.compat.mjlab._tensors import ids, tensor
 from mjsense.core import mujoco_names
 
-_FREE = 0  # mjJNT_FREE
+_FREE, _BALL = 0, 1  # mjJNT_FREE, mjJNT_BALL
 
 
 def _like(values: Any, target: Any) -> Any:
@@ -53,7 +54,7 @@ class EntityData:
     """
 
     def __init__(self, entity: Any, simulation: Any) -> None:
-        model = simulation.model
+        targets, entity, model = entity, entity.native, simulation.model
         named = [mujoco_names.name2id(model, mujoco_names.Obj.BODY, f"{entity.name}/{name}") for name in entity.body_names]
         self._name, self._data = entity.name, Data(simulation)
         self._bodies = np.array(sorted(body for body in named if body >= 0), int)
@@ -62,9 +63,18 @@ class EntityData:
         free = [j for j in joints if model.jnt_type[j] == _FREE]
         self._free = (int(model.jnt_qposadr[free[0]]), int(model.jnt_dofadr[free[0]])) if free else None
         others = [j for j in joints if j not in free]
-        self._qpos, self._qvel = (np.array(adr[others], int) for adr in (model.jnt_qposadr, model.jnt_dofadr))
+        widths = {"qpos": [4 if model.jnt_type[j] == _BALL else 1 for j in others]}
+        widths["qvel"] = [3 if width == 4 else 1 for width in widths["qpos"]]
+        firsts = {"qpos": model.jnt_qposadr[others], "qvel": model.jnt_dofadr[others]}
+        self._qpos, self._qvel = (
+            np.array([adr + i for adr, width in zip(firsts[field], widths[field]) for i in range(width)], int)
+            for field in ("qpos", "qvel")
+        )
         actuators = (mujoco_names.name2id(model, mujoco_names.Obj.ACTUATOR, f"{entity.name}/{a}") for a in entity.actuator_names)
         self._ctrl = np.array([*actuators], int)
+        root = self._bodies[0] if len(self._bodies) else 0
+        self._mocap = int(model.body_mocapid[root]) if self._free is None else -1
+        self._targets = Targets(targets, model, simulation.num_worlds)
         self._ipos = np.array(model.body_ipos[self._bodies[0]]) if len(self._bodies) else None
 
     def _field(self, name: str) -> Any:
@@ -72,12 +82,18 @@ class EntityData:
 
     # What the writers of Entity do.
 
+    @staticmethod
+    def _rows(env_ids: Any) -> Any:
+        """A slice or the indices of these worlds."""
+        rows = ids(env_ids)
+        if rows is None or isinstance(rows, slice):
+            return slice(None) if rows is None else rows
+        rows = np.atleast_1d(np.asarray(rows))
+        return np.flatnonzero(rows) if rows.dtype == bool else rows
+
     def _write(self, field: str, columns: np.ndarray, values: Any, env_ids: Any) -> None:
-        target, rows = self._field(field), ids(env_ids)
-        if rows is not None and not isinstance(rows, slice):
-            rows = np.asarray(rows)
-            rows = (np.flatnonzero(rows) if rows.dtype == bool else rows)[:, None]
-        place = (slice(None) if rows is None else rows, columns)
+        target, rows = self._field(field), self._rows(env_ids)
+        place = (rows if isinstance(rows, slice) else rows[:, None], columns)
         if values.shape[-1] not in (1, len(columns)):
             raise ValueError(
                 f"entity '{self._name}': {values.shape[-1]} numbers of {field} for each world, and it has {len(columns)}"
@@ -112,6 +128,45 @@ class EntityData:
         columns = {"qpos": self._qpos, "qvel": self._qvel, "ctrl": self._ctrl}[field]
         chosen = ids(joint_ids)
         self._write(field, columns if chosen is None else np.atleast_1d(columns[np.asarray(chosen)]), values, env_ids)
+
+    def write_wrench(self, force: Any, torque: Any, env_ids: Any = None, body_ids: Any = None) -> None:
+        """``[N, bodies, 3]``, N and N m in the world's frame, at the centres of mass; None leaves the present one."""
+        bodies = self._bodies if body_ids is None else np.atleast_1d(self._bodies[ids(body_ids)])
+        for values, first in ((force, 0), (torque, 3)):
+            if values is None:
+                continue
+            if len(values.shape) < 2 or tuple(values.shape[-2:]) not in ((len(bodies), 3), (1, 3)):
+                raise ValueError(
+                    f"entity '{self._name}': a wrench of the shape {tuple(values.shape)} is for {len(bodies)} bodies: "
+                    f"[worlds, {len(bodies)}, 3]"
+                )
+            target = self._field("xfrc_applied")
+            rows = self._rows(env_ids)
+            target[rows if isinstance(rows, slice) else rows[:, None], bodies, first : first + 3] = _like(values, target)
+
+    def write_mocap_pose(self, pose: Any, env_ids: Any = None) -> None:
+        if self._mocap < 0:
+            raise ValueError(f"entity '{self._name}' has no mocap body as its root: its mocap pose cannot be written")
+        if pose.shape[-1] != 7:
+            raise ValueError(f"entity '{self._name}': {pose.shape[-1]} numbers of a mocap pose, not 7")
+        for field, place in (("mocap_pos", slice(0, 3)), ("mocap_quat", slice(3, 7))):
+            target = self._field(field)
+            target[self._rows(env_ids), self._mocap] = _like(pose[:, place], target)
+
+    def write_targets(self) -> None:
+        self._targets.write(self._field("ctrl"), _like)
+
+    def clear_targets(self, env_ids: Any = None) -> None:
+        self._targets.clear(env_ids)
+
+    def set_target(self, name: str, values: Any, element_ids: Any = None, env_ids: Any = None) -> None:
+        target, rows = self._targets[name], self._rows(env_ids)
+        columns = np.arange(target.shape[1])
+        chosen = ids(element_ids)
+        columns = columns if chosen is None else np.atleast_1d(columns[chosen])
+        if len(values.shape) and values.shape[-1] not in (1, len(columns)):
+            raise ValueError(f"entity '{self._name}': {values.shape[-1]} numbers of {name} for {len(columns)} elements")
+        target[rows if isinstance(rows, slice) else rows[:, None], columns] = _like(values, target)
 
     # What tasks read.
 
@@ -161,6 +216,8 @@ class EntityData:
         return _rotated(self.root_link_quat_w, self.root_link_ang_vel_w, -1)
 
     def __getattr__(self, name: str) -> Any:
+        if name in NAMES:
+            return self._targets[name]
         parts = {
             "pos": ("pose", slice(0, 3)),
             "quat": ("pose", slice(3, 7)),

@@ -241,5 +241,49 @@ class Entity:
     def write_ctrl_to_sim(self, ctrl: Any, ctrl_ids: Any = None, env_ids: Any = None) -> None:
         self.data.write_joints("ctrl", ctrl, ctrl_ids, env_ids)
 
+    def write_external_wrench_to_sim(self, forces: Any, torques: Any, env_ids: Any = None, body_ids: Any = None) -> None:
+        """``[N, bodies, 3]``, N and N m in the world's frame, until the next call or reset; None keeps the present ones."""
+        self.data.write_wrench(forces, torques, env_ids, body_ids)
+
+    def write_mocap_pose_to_sim(self, mocap_pose: Any, env_ids: Any = None) -> None:
+        """Of an entity without a free joint, ``[N, 7]``: m, wxyz."""
+        self.data.write_mocap_pose(mocap_pose, env_ids)
+
+    # Targets of actuators, which write_data_to_sim() writes to their controls.
+
+    def set_joint_position_target(self, position: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self.data.set_target("joint_pos_target", position, joint_ids, env_ids)
+
+    def set_joint_velocity_target(self, velocity: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self.data.set_target("joint_vel_target", velocity, joint_ids, env_ids)
+
+    def set_joint_effort_target(self, effort: Any, joint_ids: Any = None, env_ids: Any = None) -> None:
+        self.data.set_target("joint_effort_target", effort, joint_ids, env_ids)
+
+    def set_tendon_len_target(self, length: Any, tendon_ids: Any = None, env_ids: Any = None) -> None:
+        self.data.set_target("tendon_len_target", length, tendon_ids, env_ids)
+
+    def set_tendon_vel_target(self, velocity: Any, tendon_ids: Any = None, env_ids: Any = None) -> None:
+        self.data.set_target("tendon_vel_target", velocity, tendon_ids, env_ids)
+
+    def set_tendon_effort_target(self, effort: Any, tendon_ids: Any = None, env_ids: Any = None) -> None:
+        self.data.set_target("tendon_effort_target", effort, tendon_ids, env_ids)
+
+    def set_site_effort_target(self, effort: Any, site_ids: Any = None, env_ids: Any = None) -> None:
+        self.data.set_target("site_effort_target", effort, site_ids, env_ids)
+
+    def write_data_to_sim(self) -> None:
+        """Writes the targets to the controls of all actuators of the entity. Call it before a physics step."""
+        self.data.write_targets()
+
+    def reset(self, env_ids: Any = None) -> None:
+        """Sets the targets to 0."""
+        self.data.clear_targets(env_ids)
+
+    clear_state = reset
+
+    def update(self, dt: float) -> None:
+        """Has no effect: MuJoCo computes the actuators."""
+
 
 __all__ = ["Entity", "EntityArticulationInfoCfg", "EntityCfg"]

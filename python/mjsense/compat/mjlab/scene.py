@@ -178,17 +178,24 @@ class Scene:
             sensor._kept = None
 
     def reset(self, env_ids: Any = None) -> None:
-        """Resets the sensors of these worlds, by default of all."""
+        """Resets the sensors, and the targets of entities, of these worlds, by default of all."""
         if self._simulation is not None:
             self._simulation.reset_sensors(ids(env_ids))
+            for entity in self._entities.values():
+                entity.reset(env_ids)
         for sensor in self._sensors.values():
             sensor._kept = None
+
+    def write_data_to_sim(self) -> None:
+        """Writes the targets of the entities' actuators to their controls. Call it before a physics step."""
+        for entity in self._entities.values():
+            entity.write_data_to_sim()
 
     def _begin(self, simulation: Any) -> None:
         """The worlds exist."""
         self._simulation = simulation
         for entity in self._entities.values():
-            entity._data = EntityData(entity.native, simulation)
+            entity._data = EntityData(entity, simulation)
 
 
 __all__ = ["Scene", "SceneCfg"]

@@ -14,8 +14,8 @@
 //   ambient   matte irradiance / pi + (F0 A + F90 B) radiance in the mirrored direction ("split sum")
 
 #include "mjsense/render/kernels/ambient_occlusion.h"
-#include "mjsense/render/kernels/shading.h"
 #include "mjsense/render/kernels/tone_mapping.h"
+#include "mjsense/render/kernels/warp_shading.h"
 
 namespace mjsense::render {
 namespace {
@@ -239,6 +239,7 @@ inline void shade_physical(const View& view, const Surfaces& s, const Hits& hits
 inline void shade(const View& view, const Surfaces& s, const Hits& hits, std::uint32_t lanes,
                   Shadows* shadows, Colors& out) {
   if (view.physical.on) return shade_physical(view, s, hits, lanes, shadows, out);
+  if (view.warp.on) return shade_as_mujoco_warp(view, s, hits, lanes, shadows, out);
   shade_classic(view, s, hits, lanes, shadows, out);
 }
 

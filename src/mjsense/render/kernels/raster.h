@@ -61,7 +61,7 @@ inline bool draw(const ViewGeom& g, int index, const Drawn& drawn, int lane, int
     store(h.prim + k, select(hit, int_of(face), load(h.prim + k)));
     store(h.u + k, select(hit, e1 * inverse, load(h.u + k)));
     store(h.v + k, select(hit, e2 * inverse, load(h.v + k)));
-    if (g.mesh) continue;  // the mesh has vertex normals
+    if (g.mesh && g.mesh->normals) continue;
     const Vec3f n =
         to_geom(g.rot, {splat(-drawn.inverse_t[0][lane]), splat(-drawn.inverse_t[1][lane]),
                         splat(drawn.inverse_t[2][lane])});

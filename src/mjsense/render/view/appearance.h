@@ -36,8 +36,10 @@ inline constexpr int kClassicLights = 8;
 class Appearance {
  public:
   // max_lights: maximum number of active lights that are used, counting the headlight first; at
-  // most kMaxLights.
-  explicit Appearance(const mjModel* model, int max_lights = kClassicLights);
+  // most kMaxLights. as_mujoco_warp: geoms have the colours of their materials, without
+  // transparency and reflections.
+  explicit Appearance(const mjModel* model, int max_lights = kClassicLights,
+                      bool as_mujoco_warp = false);
   void copy(const mjModel* model);  // no allocation
 
   // [geoms, then parts of flexes, then skins; 4], resolved as by MuJoCo's visualiser
@@ -55,9 +57,11 @@ class Appearance {
   const Rgb64& environment_tint() const { return environment_tint_; }
 
  private:
+  void copy_warp_colors(const mjModel* model);
   void copy_lights(const mjModel* model);
 
   int max_lights_;
+  bool as_mujoco_warp_;
   std::vector<rays::FlexPart> flex_parts_;
   std::vector<float> rgba_;
   std::vector<Material> materials_;

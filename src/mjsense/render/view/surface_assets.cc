@@ -88,7 +88,8 @@ void SurfaceAssets::keep(std::shared_ptr<const MeshTables> tables, MeshSurface& 
   tables_.push_back(std::move(tables));
 }
 
-SurfaceAssets::SurfaceAssets(const mjModel* model, bool meshes, bool textures) {
+SurfaceAssets::SurfaceAssets(const mjModel* model, bool meshes, bool textures,
+                             bool as_mujoco_warp) {
   textures_.resize(model->ntex);
   meshes_.resize(model->nmesh);
   skins_.resize(model->nskin);
@@ -102,6 +103,9 @@ SurfaceAssets::SurfaceAssets(const mjModel* model, bool meshes, bool textures) {
   for (int i = 0; i < model->nmesh && meshes; ++i)
     keep(mesh_tables(model, i, true), meshes_[i], model->mesh_vert + 3 * model->mesh_vertadr[i],
          model->mesh_face + 3 * model->mesh_faceadr[i]);
+  if (!as_mujoco_warp) return;
+  for (MeshSurface& mesh : meshes_) mesh.normals = nullptr;
+  for (Texture& texture : textures_) texture.levels = std::min(texture.levels, 1);
 }
 
 void SurfaceAssets::add_flex(const mjModel* model, int id, bool textures) {

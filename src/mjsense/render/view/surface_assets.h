@@ -42,7 +42,8 @@ class SurfaceAssets {
   // `meshes`: prepare all meshes, including those that no geom uses, because a world may change a
   // geom's mesh or group. False for views that need no normals.
   // `model` must outlive this object, which refers to the positions and faces of its meshes.
-  SurfaceAssets(const mjModel* model, bool meshes, bool textures);
+  // `as_mujoco_warp`: meshes have the normals of their faces, and textures no mipmaps.
+  SurfaceAssets(const mjModel* model, bool meshes, bool textures, bool as_mujoco_warp = false);
   SurfaceAssets(const SurfaceAssets&) = delete;
   SurfaceAssets& operator=(const SurfaceAssets&) = delete;
 

@@ -37,6 +37,14 @@ struct Haze {
   bool operator==(const Haze&) const = default;
 };
 
+// mujoco_warp's light model (warp_shading.h) instead of MuJoCo's classic one.
+struct WarpLight {
+  bool on = false;
+  float ambient[3] = {};  // of all lights together, which neither distance nor shadows reduce
+
+  bool operator==(const WarpLight&) const = default;
+};
+
 struct View {
   PixelGrid grid;
   float near = 0, far = 0;  // clip planes, planar depth, m; far 0: no limit
@@ -52,6 +60,7 @@ struct View {
   int num_lights = 0;
   bool shadows = false;
   PhysicalView physical;
+  WarpLight warp;
   OccluderSpheres occluders;
   bool layered = false;                    // fixed geoms are drawn first
   const FixedTile* fixed_tiles = nullptr;  // by tile: their cached image; null: not cached

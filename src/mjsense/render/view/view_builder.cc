@@ -90,7 +90,9 @@ ViewBuilder::ViewBuilder(const mjModel* model, const SurfaceAssets& assets,
   view_.near = options.near;
   view_.far = options.far;
   view_.shadows = options.shadows;
-  view_.skybox = options.textures && !options.physical.hides_skybox ? assets.skybox() : nullptr;
+  view_.warp.on = options.as_mujoco_warp;
+  const bool sky = options.as_mujoco_warp ? options.warp_skybox : options.textures;
+  view_.skybox = sky && !options.physical.hides_skybox ? assets.skybox() : nullptr;
   if (options.reflections && model->nmat > 0) {  // any world may set a material's reflectance
     ViewOptions flat = options;
     flat.reflections = flat.shadows = flat.layered = false;
@@ -109,7 +111,8 @@ void ViewBuilder::add_shape(const rays::RayGeom& source, int id, const float* rg
   g.fixed = static_cast<std::size_t>(id) < fixed_.size() && fixed_[id];
   place(source, position, rotation, g);
   const Texture* texture = shape(g);
-  const bool sight = find_window(view_, g) && rgba[3] > 0;
+  const bool hidden = view_.warp.on && g.shows_back;  // not a veil, as in MuJoCo
+  const bool sight = find_window(view_, g) && rgba[3] > 0 && !hidden;
   if (!sight && !view_.shadows && !(view_.physical.occlusion_reach > 0) &&
       !view_.physical.all_geoms)
     return;
@@ -215,7 +218,7 @@ const View& ViewBuilder::build(const rays::RayWorld& world, const rays::SharedGe
   set_lights(world, appearance, position, rotation);
   if (options_.shadows) light_space_.fill(view_);
   if (view_.physical.occlusion_reach > 0) set_occluders();
-  if (view_.skybox) set_sky(endless, appearance.sky(), position, rotation);
+  if (view_.skybox && !view_.warp.on) set_sky(endless, appearance.sky(), position, rotation);
   if (mirrored_) set_mirror(world, shapes, appearance, markers, position, rotation);
   return view_;
 }
@@ -490,6 +493,13 @@ void ViewBuilder::set_surface(const rays::RayGeom& source, const float* rgba,
       }
     }
   }
+  if (view_.warp.on && g.type == mjGEOM_PLANE) {  // mujoco_warp treats all planes as infinite ones
+    for (int i = 0; i < 2; ++i) {
+      const float size = std::max(g.size[i], 0.0f);
+      s.uv_scale[i] = material->repeat[i] * (size > 0 ? size : 1);
+      s.uv_offset[i] = -0.5f - 0.5f * size * material->repeat[i];
+    }
+  }
   // Cube maps: MuJoCo uses directions in the unit shape that it scales; for meshes and planes, in
   // metres.
   const bool in_meters = g.mesh || g.height_field || g.type == mjGEOM_PLANE;
@@ -568,6 +578,10 @@ void ViewBuilder::set_occluders() {
 void ViewBuilder::set_lights(const rays::RayWorld& world, const Appearance& appearance,
                              const double position[3], const double rotation[9]) {
   view_.num_lights = 0;
+  std::fill_n(view_.warp.ambient, 3, 0.0f);
+  for (const ViewLight& light : appearance.lights()) {
+    for (int k = 0; k < 3; ++k) view_.warp.ambient[k] += light.ambient[k];
+  }
   // As in MuJoCo, so that the image is not black.
   view_.global_ambient = appearance.lights().empty() ? 0.3f : 0.0f;
   for (std::size_t i = 0; i < appearance.lights().size(); ++i) {
