@@ -12,6 +12,7 @@
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/named.h"
 #include "mjsense/scene/attach.h"
+#include "mjsense/scene/backdrop.h"
 #include "mjsense/scene/compiler_settings.h"
 #include "mjsense/scene/default_lighting.h"
 #include "mjsense/scene/mj_spec.h"
@@ -145,6 +146,10 @@ void Scene::Impl::attach() {
     check_name(name, cfg.terrain.has_value(), attached);
     attached.push_back(attach_entity(spec.get(), name, entity, vfs, warnings));
   }
+  if (cfg.backdrop.empty()) return;
+  const std::string name(kBackdrop);
+  check_name(name, cfg.terrain.has_value(), attached);
+  attached.push_back(attach_entity(spec.get(), name, backdrop_entity(cfg.backdrop), vfs, warnings));
 }
 
 // Keys are unique; two sensors with the same name are always an error.
