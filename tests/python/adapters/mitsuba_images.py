@@ -22,7 +22,6 @@ SIZE = (64, 48)  # width, height
 FOVY = 40.0
 STUDIO = 0.3  # radiance of a white matte surface in the studio, relative to that of emission 1
 MINIMUM = 40.0  # dB
-ROOM_LIGHT = 900.0  # cd
 
 
 class Geom:
@@ -84,7 +83,7 @@ def walls(half, height, colors, window=False):
 
 
 def scenes():
-    """Name -> geoms, camera's (position, target), intensity of the studio, point light (position, radius)."""
+    """Name -> geoms, camera's (position, target), intensity of the studio, point light (position, radius, candela)."""
     white, red, green = (0.73, 0.73, 0.73), (0.6, 0.05, 0.05), (0.1, 0.45, 0.1)
     cornell = [
         *walls(1, 2, (white, white, red, green, white)),
@@ -106,10 +105,10 @@ def scenes():
     return {
         "cornell": (cornell, ((0, -4.2, 1), (0, 0, 1)), 0, None),
         "materials": (grid, ((0, -4, 1.4), (0, 0, 0.75)), 1, None),
-        "room": (room, ((-0.6, -1.4, 1.3), (0.1, 0.6, 0.7)), 4, ((-1, -1, 1.7), 0.1)),
-        "mesh": (mapped_mesh(), ((0, -2.4, 1.3), (0, 0, 0.55)), 1, ((-1.5, -1.5, 2.5), 0.15)),
-        "panda": (plain_model("pick", "franka", "table"), ((1.5, -0.9, 1.5), (0.3, 0, 0.7)), 1, ((1.2, 0.8, 2.2), 0.1)),
-        "kitchen": (plain_model("open", "franka", "kitchen"), ((-1.2, -0.6, 1.6), (0.4, 0.3, 0.9)), 1, ((-0.6, -0.6, 2.1), 0.1)),
+        "room": (room, ((-0.6, -1.4, 1.3), (0.1, 0.6, 0.7)), 4, ((-1, -1, 1.7), 0.1, 900)),
+        "mesh": (mapped_mesh(), ((0, -2.4, 1.3), (0, 0, 0.55)), 1, ((-1.5, -1.5, 2.5), 0.15, 900)),
+        "panda": (plain_model("pick", "franka", "table"), ((1.5, -0.9, 1.5), (0.3, 0, 0.7)), 1, ((1.2, 0.8, 2.2), 0.1, 300)),
+        "kitchen": (plain_model("open", "franka", "kitchen"), ((-1.2, -0.6, 1.6), (0.4, 0.3, 0.9)), 1, ((-0.6, -0.6, 2.1), 0.1, 300)),
     }
 
 
@@ -124,7 +123,7 @@ def mjsense_images(geoms, camera, studio, light, samples):
     lamp = ""
     if light:
         place = " ".join(str(x) for x in light[0])
-        lamp = f'<light type="point" pos="{place}" bulbradius="{light[1]}" intensity="{ROOM_LIGHT}" range="1e6" diffuse="1 1 1"/>'
+        lamp = f'<light type="point" pos="{place}" bulbradius="{light[1]}" intensity="{light[2]}" range="1e6" diffuse="1 1 1"/>'
     model, files, state, maps = geoms if isinstance(geoms, tuple) else (simple_model(geoms), {}, {}, None)
     options = {"width": SIZE[0], "height": SIZE[1], "samples_per_pixel": samples, "environment_intensity": studio, "samples": 16}
     if maps is None:
@@ -293,7 +292,7 @@ def mitsuba_image(mi, sim, geoms, camera, studio, light, samples):
         turned = mi.ScalarTransform4f().rotate([1, 0, 0], 90)
         scene["studio"] = {"type": "envmap", "bitmap": mi.Bitmap(image), "to_world": turned}
     if light:
-        radiance = ROOM_LIGHT / 307.2 / (np.pi * light[1] ** 2)
+        radiance = light[2] / 307.2 / (np.pi * light[1] ** 2)
         scene["lamp"] = {
             "type": "sphere",
             "center": list(light[0]),

@@ -33,6 +33,9 @@ def plain_model(task, robot, scene):
     for material in root.iter("material"):
         material.set("emission", "0")
         material.set("reflectance", "0")
+        # Without their textures, walls would be white, and light in a closed room would hardly end.
+        rgba = [float(x) for x in material.get("rgba", "1 1 1 1").split()]
+        material.set("rgba", " ".join(str(x) for x in (*(0.7 * x for x in rgba[:3]), rgba[3])))
     for key in root.findall("keyframe"):
         root.remove(key)
     state = {name: np.array(getattr(env.sim, name)[0]) for name in ("qpos", "mocap_pos", "mocap_quat")}
@@ -204,9 +207,9 @@ def shapes(mi, sim, maps=None):
         place = mi.ScalarTransform4f(place)
         kind, size = int(model.geom_type[i]), np.array(model.geom_size[i], float)
         if kind == BOX:
-            found[f"geom{i}"] = {"type": "cube", "to_world": place.scale(list(size)), "bsdf": look}
+            found[f"geom{i}"] = {"type": "cube", "to_world": place.scale([float(x) for x in size]), "bsdf": look}
         elif kind == SPHERE:
-            found[f"geom{i}"] = {"type": "sphere", "to_world": place.scale(size[0]), "bsdf": look}
+            found[f"geom{i}"] = {"type": "sphere", "to_world": place.scale([float(size[0])] * 3), "bsdf": look}
         elif kind == PLANE:
             half = [float(x) if x > 0 else 100.0 for x in size[:2]]
             found[f"geom{i}"] = {"type": "rectangle", "to_world": place.scale([*half, 1]), "bsdf": look}
