@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Physically based images per CPU second compared with mujoco-warp-pbr on Warp's CPU device.
 
-64 worlds at 84 x 84, and one image at 640 x 480, in views of camera_scenes.VIEWS; rgb with shadows in the light of the same surroundings. The
-peer has no ambient occlusion: rows say whether mjsense's images have it. Neither side draws samples within pixels; mjsense draws mirrors and the
-peer does not. Physics and kinematics are not measured. --pictures=FOLDER writes the images of both. Other arguments are views to measure. The
-peer needs a Python 3.12; the first run compiles its kernels, which takes minutes.
+64 worlds at 84 x 84, and one image at 640 x 480, in views of camera_scenes.VIEWS; rgb with shadows in the light of the same
+surroundings. The peer has no ambient occlusion: rows say whether mjsense's images have it. Neither side draws samples within
+pixels; mjsense draws mirrors and the peer does not. Physics and kinematics are not measured. --pictures=FOLDER writes the images
+of both. Other arguments are views to measure. The peer needs a Python 3.12; the first run compiles its kernels for each scene,
+which takes minutes.
 """
 
 from __future__ import annotations
@@ -46,14 +47,27 @@ def main() -> None:
         for name in [v for v in VIEWS if v in sys.argv] or VIEWS:
             view = camera_scenes.VIEWS[name]
             for width, height, worlds in SIZES:
-                shots = [Shot((width, height), shading="pbr", ambient_occlusion=on, environment=str(surroundings)) for on in (True, False)]
+                shots = [
+                    Shot((width, height), shading="pbr", ambient_occlusion=on, environment=str(surroundings))
+                    for on in (True, False)
+                ]
                 ours = Ours(view, shots, worlds=worlds, threads=1)
                 rates = [ours.rate(0), ours.rate(1)]
                 images = pathlib.Path(scratch) / "images.npz"
-                peer = run_peer("warp_pbr", "warp_pbr_cameras", name, str(width), str(height), str(worlds), str(surroundings), str(images))
+                peer = run_peer(
+                    "warp_pbr", "warp_pbr_cameras", name, str(width), str(height), str(worlds), str(surroundings), str(images)
+                )
                 case = f"{view.label}, {width}x{height}"
                 for rate, occlusion in zip(rates, ("with", "without")):
-                    rows.append(Row(f"{case}, {occlusion} ambient occlusion", rate, "images/CPU s", peer["images_per_second"], "mujoco-warp-pbr"))
+                    rows.append(
+                        Row(
+                            f"{case}, {occlusion} ambient occlusion",
+                            rate,
+                            "images/CPU s",
+                            peer["images_per_second"],
+                            "mujoco-warp-pbr",
+                        )
+                    )
                     print(f"{rows[-1].case}: {rate:.1f} against {rows[-1].peer:.2f}", file=sys.stderr)
                 if folder:
                     first = Ours(view, shots, worlds=1, threads=1)

@@ -4,6 +4,7 @@ shutter of a D435 in a bright and in a dark room. python tools/shutter_picture.p
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -11,7 +12,8 @@ from PIL import Image
 import mjsense as mjs
 
 BLADES = "".join(
-    f"<geom type='box' size='.16 .045 .004' pos='{0.19 * np.cos(a):.4f} {0.19 * np.sin(a):.4f} 0' euler='0 0 {a:.4f}' material='blade'/>"
+    f"<geom type='box' size='.16 .045 .004' pos='{0.19 * np.cos(a):.4f} {0.19 * np.sin(a):.4f} 0' "
+    f"euler='0 0 {a:.4f}' material='blade'/>"
     for a in np.arange(5) * 2 * np.pi / 5
 )
 XML = f"""
@@ -38,7 +40,7 @@ XML = f"""
 SIZE = (400, 300)
 
 
-def image(light: float = 1, **options: object) -> np.ndarray:
+def image(light: float = 1, **options: Any) -> np.ndarray:
     lamp = " ".join(f"{light * x:g}" for x in (1, 0.95, 0.85))
     camera = mjs.CameraSensorCfg(
         name="cam", camera_name="w/view", width=SIZE[0], height=SIZE[1], shading="pbr", use_shadows=True, samples=4, **options

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images per CPU second of mujoco-warp-pbr's real-time tier on the CPU: warp_pbr_cameras VIEW WIDTH HEIGHT WORLDS SURROUNDINGS.hdr
-images.npz.
+"""Images per CPU second of mujoco-warp-pbr's real-time tier on the CPU:
 
-rgb with shadows, textures, all lights and the surroundings; one sample for each pixel, and no reflections in mirrors. The time includes the
-refit of the BVH and the images; as for mjsense, kinematics are computed before. rgb of world 0 in frame 0 is written to images.npz.
+    warp_pbr_cameras VIEW WIDTH HEIGHT WORLDS SURROUNDINGS.hdr images.npz
+
+rgb with shadows, textures, all lights and the surroundings; one sample for each pixel, and no reflections in mirrors. The time
+includes the refit of the BVH and the images; as for mjsense, kinematics are computed before. rgb of world 0 in frame 0 is written
+to images.npz.
 """
 
 import json

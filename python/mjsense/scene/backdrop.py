@@ -11,13 +11,12 @@ from pathlib import Path
 
 from mjsense.scene.converted_assets import convert_assets
 
-
 _lock = threading.Lock()
 
 
 @cache
 def _folder() -> tempfile.TemporaryDirectory[str]:
-    """Holds the converted files until the process ends: scenes refer to them until they are compiled, and recordings archive them."""
+    """Holds the converted files until the process ends, because scenes and the archives of recordings are made of them."""
     return tempfile.TemporaryDirectory(prefix="mjsense-backdrop-")
 
 
