@@ -29,6 +29,7 @@ class Shot:
     shadows: bool = True
     shading: Literal["classic", "pbr"] = "classic"
     ambient_occlusion: bool = True
+    environment: str = "model"
 
 
 class Ours:
@@ -46,6 +47,7 @@ class Ours:
                 use_shadows=shot.shadows,
                 shading=shot.shading,
                 ambient_occlusion=shot.ambient_occlusion,
+                environment=shot.environment,
             )
             for i, shot in enumerate(shots)
         ]

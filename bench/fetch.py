@@ -70,10 +70,26 @@ def _environment(name: str) -> pathlib.Path:
     if not stamp.exists() or stamp.read_text() != wanted:
         print(f"installing bench/peers/{name}.txt into {folder}", file=sys.stderr)
         shutil.rmtree(folder, ignore_errors=True)
-        subprocess.run([sys.executable, "-m", "venv", str(folder)], check=True)
+        subprocess.run([_python_for(wanted), "-m", "venv", str(folder)], check=True)
         _pip(f"{name}.txt", str(python), "install", "--no-deps", "-r", str(requirements))
         stamp.write_text(wanted)
     return python
+
+
+def _python_for(requirements: str) -> str:
+    """This Python, or one of the version in the first line, ``# Python 3.12``."""
+    words = requirements.partition("\n")[0].split()
+    if words[:2] != ["#", "Python"]:
+        return sys.executable
+    version = words[2]
+    installed = sorted(pathlib.Path.home().glob(f".pyenv/versions/{version}*/bin/python"))
+    for python in (f"python{version}", *map(str, installed)):
+        try:
+            subprocess.run([python, "-c", "import venv"], check=True, capture_output=True)
+        except (OSError, subprocess.CalledProcessError):
+            continue
+        return python
+    raise Unavailable(f"needs Python {version}, in PATH as python{version} or in ~/.pyenv")
 
 
 def _pip(what: str, python: str, *args: str) -> None:

@@ -14,6 +14,7 @@
 #include "mjsense/core/files/embedded_files.h"
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/core/mujoco_call.h"
+#include "mjsense/scene/backdrop.h"
 #include "mjsense/scene/compiled_model.h"
 #include "mjsense/scene/resolve.h"
 #include "python/bindings/bindings.h"
@@ -159,7 +160,15 @@ scene::SceneCfg read_scene(nb::handle config, nb::handle spec, nb::list sensors,
   return cfg;
 }
 
+// scene::BackdropConverter.
+static std::string converted_backdrop(const std::string& path) {
+  const nb::gil_scoped_acquire gil;
+  const nb::object convert = nb::module_::import_("mjsense.scene.backdrop").attr("backdrop_model");
+  return nb::cast<std::string>(convert(path));
+}
+
 void bind_scene(nb::module_& m) {
+  scene::set_backdrop_converter(&converted_backdrop);
   m.def(
       "check_obj_type", [](const std::string& type) { scene::obj_type(type, "ObjRef"); },
       nb::arg("type"), "Raises if MuJoCo has no type of elements of this name.");

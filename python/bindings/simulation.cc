@@ -18,6 +18,7 @@
 #include "mjsense/core/model_indices.h"
 #include "mjsense/effects/effect_sensor.h"
 #include "mjsense/scene/mujoco_log.h"
+#include "mjsense/sensors/camera/camera_sensor.h"
 #include "mjsense/sensors/imu/imu_sensor.h"
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 #include "python/bindings/bindings.h"
@@ -114,7 +115,9 @@ NumpyArray model_field(PySimulation& self, const std::string& name) {
 bool counts_steps(const Sensor& sensor) {
   if (const auto* imu = dynamic_cast<const sensors::ImuSensor*>(&sensor)) return imu->has_errors();
   return dynamic_cast<const effects::EffectSensor*>(&sensor) ||
-         (dynamic_cast<const sensors::RayCastSensor*>(&sensor) && sensor.wants_substep());
+         ((dynamic_cast<const sensors::RayCastSensor*>(&sensor) ||
+           dynamic_cast<const sensors::CameraSensor*>(&sensor)) &&
+          sensor.wants_substep());
 }
 
 // Sets the duration of a physics step in all worlds, each of which must begin an episode.
@@ -134,7 +137,7 @@ void set_timestep(PySimulation& self, double seconds) {
     for (const auto& sensor : sim.scene().sensors()) {
       if (counts_steps(*sensor))
         throw ValueError(fmt::format(
-            "timestep: the noise, delays or ray times of sensor '{}' are in steps of {:g} s: set "
+            "timestep: the noise, delays, ray times or exposures of sensor '{}' are in steps of {:g} s: set "
             "SceneCfg(options=MujocoCfg(timestep={:g})) before the scene is made",
             sensor->name(), sim.model()->opt.timestep, seconds));
     }

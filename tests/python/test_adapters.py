@@ -72,7 +72,7 @@ PACKAGES = {
         "stringcase~=1.2",
         "tqdm",
     ),
-    "mitsuba": ("mitsuba==3.9.1", "mujoco==3.8.1", "gymnasium==1.4.0", "h5py", "nanobind-backend>=1.0"),
+    "mitsuba": ("mitsuba==3.9.1", "flip-evaluator==1.7", "mujoco==3.8.1", "gymnasium==1.4.0", "h5py", "nanobind-backend>=1.0"),
     "programs": (
         "mujoco==3.8.1",
         "dm_control==1.0.41",

@@ -154,6 +154,9 @@ def test_command_lines(page, tmp_path):
 
     (tmp_path / "map.toml").write_text('state = "obs/agent/qpos/arm"')
     np.save(tmp_path / "mid360.npy", np.random.default_rng(0).uniform(-0.5, 0.5, (20000, 2)))
+    if any("room.glb" in line for line in command_lines(page)):
+        trimesh = pytest.importorskip("trimesh")
+        trimesh.creation.box((8, 4, 8)).export(tmp_path / "room.glb")
     lines = command_lines(page)
     if not any(line[0] == "record" for line in lines):
         run(["record", "pick", "--out", "data", *SHORT], tmp_path)

@@ -153,7 +153,7 @@ def test_timestep(timestep):
 def test_timestep_of_sensors_that_count_steps():
     delayed = mjs.EffectSensorCfg(name="d", sensor="acc", effects=(mjs.effects.Delay(delay_s=0.004),))
     sim = simulation(1, sensors=(delayed,))
-    with pytest.raises(ValueError, match=r"timestep: the noise, delays or ray times of sensor 'd' are in steps of 0\.002 s: set SceneCfg\(options="):
+    with pytest.raises(ValueError, match=r"timestep: the noise, delays, ray times or exposures of sensor 'd' are in steps of 0\.002 s: set SceneCfg\(options="):
         sim.options.timestep = 0.001
     assert sim.options.timestep == 0.002
     site = mjs.ObjRef("site", "s")

@@ -89,6 +89,7 @@ PHYSICAL = {
     "exposure_mode",
     "exposure_time_constant",
     "imager",
+    "motion_samples",
     "tone_mapping",
     "white_balance",
     "environment",
@@ -124,16 +125,19 @@ def test_every_image_option_is_kept(option, tmp_path):
     given = {"environment": write_sky(tmp_path / "sky.hdr")} if option == "environment_rotation" else {}
     if option == "exposure_time_constant":
         physical["exposure_mode"] = "auto"
+    if option == "motion_samples":
+        physical["imager"] = "d435"
     physical |= given
     for name, given in (("usual", physical), ("data", {**physical, option: value})):
         mjs.record("pick", out=tmp_path / name, **{**RECORDING, "episodes": 1, "horizon": 3, **given})
         made[name] = videos(tmp_path / name)
     assert made["data"] != made["usual"]
     mjs.render(tmp_path / "data", tmp_path / "same", copy=False, **given)
-    assert (videos(tmp_path / "same") == made["data"]) == (option != "imager")  # it draws other random numbers
+    # An image sensor draws other random numbers.
+    assert (videos(tmp_path / "same") == made["data"]) == (option not in ("imager", "motion_samples"))
     assert mjs.Dataset(tmp_path / "same").episodes[0].settings[option] == value
     mjs.render(tmp_path / "data", tmp_path / "back", **{**given, option: default})
-    assert videos(tmp_path / "back") == made["usual"]
+    assert (videos(tmp_path / "back") == made["usual"]) == (option != "motion_samples")
 
 
 def test_a_file_that_a_recording_names_is_not_opened(tmp_path):

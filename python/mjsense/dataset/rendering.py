@@ -158,7 +158,8 @@ class _House:
         streams = [stream for camera in cameras for stream in camera.streams()]
         self._sensors, handles = recorded_sensors(self._worlds.sim, [*streams, *own, *suite_sensors])
         for handle in handles:
-            if handle.has_memory:
+            # Between recorded states, the motion in images is interpolated.
+            if handle.has_memory and handle.kind != "camera":
                 raise ValueError(
                     f"sensor '{handle.name}' depends on the physics steps between observations (air time, history, delays); "
                     "render computes sensors from the recorded states only"
@@ -278,6 +279,7 @@ def render(
     exposure_mode: Literal["fixed", "auto"] | None = None,
     exposure_time_constant: float | None = None,
     imager: Literal["none", "d435", "zed_mini"] | None = None,
+    motion_samples: int | None = None,
     tone_mapping: Literal["neutral", "filmic", "linear", "agx"] | None = None,
     white_balance: float | None = None,
     environment: str | None = None,
@@ -341,8 +343,10 @@ def render(
             recorded.
         exposure_time_constant: Time in which the automatic exposure covers 63 % of a change; 0: it follows at once. By
             default as recorded. [s]
-        imager: Photon and read noise, vignetting and quantisation of the colour sensor of a real camera. By default as
-            recorded.
+        imager: Colour sensor of a real camera: photon and read noise, vignetting, quantisation, motion blur and rolling
+            shutter. By default as recorded.
+        motion_samples: Instants of an exposure of which an image with ``imager`` is the mean, where something moves; 0:
+            neither motion blur nor rolling shutter. By default as recorded.
         tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
             clips; agx: bright colours become white. By default as recorded.
         white_balance: Colour temperature of the light that appears white. By default as recorded. [K]

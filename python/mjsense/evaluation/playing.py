@@ -43,6 +43,7 @@ def evaluate(
     # options of a recording
     arm_controller: str = "",
     split: Literal["", "train", "test"] = "",
+    backdrop: str = "",
     num_worlds: int = 4,
     threads: int = 0,
     seed: Seed = 0,
@@ -61,6 +62,7 @@ def evaluate(
     exposure_mode: Literal["fixed", "auto"] = "fixed",
     exposure_time_constant: float = 0.5,
     imager: Literal["none", "d435", "zed_mini"] = "none",
+    motion_samples: int = 8,
     tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "filmic",
     white_balance: float = 6504.0,
     environment: str = "model",
@@ -122,6 +124,8 @@ def evaluate(
             ``ee_delta_pose``, or a TOML table with its fields; by default that of the robot's file.
         split: Part of the scene: ``train`` or ``test``, which have no kind of object in common; the same as ``@train``
             or ``@test`` after the scene's name.
+        backdrop: Surroundings of the scene that are only seen, an MJCF, .glb, .gltf or .obj file: nothing touches its
+            geoms.
         num_worlds: Number of worlds that run in parallel.
         threads: Number of simulation threads; 0: one per available CPU.
         seed: Random seed; the same seed gives the same episodes.
@@ -144,7 +148,10 @@ def evaluate(
         exposure: Exposure in EV at ISO 100; 1 more halves the brightness.
         exposure_mode: auto: a meter chooses the exposure of each world, instead of ``exposure``.
         exposure_time_constant: Time in which the automatic exposure covers 63 % of a change; 0: it follows at once. [s]
-        imager: Photon and read noise, vignetting and quantisation of the colour sensor of a real camera.
+        imager: Colour sensor of a real camera: photon and read noise, vignetting, quantisation, motion blur and rolling
+            shutter.
+        motion_samples: Instants of an exposure of which an image with ``imager`` is the mean, where something moves; 0:
+            neither motion blur nor rolling shutter.
         tone_mapping: From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear:
             clips; agx: bright colours become white.
         white_balance: Colour temperature of the light that appears white. [K]

@@ -167,8 +167,8 @@ class Options:
     @property
     def timestep(self) -> float:
         """Duration of a physics step, s, the same in all worlds. It can change while all worlds are at the beginning of an
-        episode, unless a sensor's noise, delays or ray times were resolved to steps, and not in environments and recordings,
-        whose robots have control periods."""
+        episode, unless a sensor's noise, delays, ray times or exposures were resolved to steps, and not in environments and
+        recordings, whose robots have control periods."""
         return self._sim.physics_dt
 
     @timestep.setter

@@ -80,6 +80,9 @@ class SceneCfg(config_methods.SceneCfg):
     """The ground; None adds no ground."""
     entities: Mapping[str, EntityCfg] = field(default_factory=dict)
     """Models by name; they are attached in this order."""
+    backdrop: str | None = None
+    """Surroundings that are only seen, an MJCF, .glb, .gltf or .obj file: cameras and rays show its geoms, and nothing
+    touches them. Its names get the prefix ``backdrop/``."""
     sensors: Sequence[Any] = ()
     """Sensor configurations, user-defined configurations with ``build()``, or :class:`mjsense.Sensor` objects."""
     extent: float | None = None
@@ -352,7 +355,10 @@ class CameraSensorCfg(SensorCfg):
     exposure_time_constant: float = 0.5
     """Time in which the automatic exposure covers 63 % of a change; 0: it follows at once. [s]"""
     imager: Literal["none", "d435", "zed_mini"] = "none"
-    """Photon and read noise, vignetting and quantisation of the colour sensor of a real camera."""
+    """Colour sensor of a real camera: photon and read noise, vignetting, quantisation, motion blur and rolling shutter."""
+    motion_samples: int = 8
+    """Instants of an exposure of which an image with ``imager`` is the mean, where something moves; 0: neither motion
+    blur nor rolling shutter."""
     tone_mapping: Literal["neutral", "filmic", "linear", "agx"] = "filmic"
     """From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; linear: clips; agx:
     bright colours become white."""
@@ -402,7 +408,7 @@ class CameraIntrinsics(config_methods.Config):
 
 @dataclass(frozen=True)
 class ImagerCfg(config_methods.Config):
-    """The image sensor of a camera: noise, quantisation and vignetting."""
+    """The image sensor of a camera: noise, quantisation, vignetting and shutter."""
 
     full_well: float = 4300.0
     """Electrons of a saturated pixel. [electrons]"""
@@ -414,6 +420,9 @@ class ImagerCfg(config_methods.Config):
     """Focal length divided by the diameter of the aperture."""
     exposure_time: float = 0.03333333333333333
     """Longest exposure; darker images than it allows are amplified. [s]"""
+    readout_time: float = 0.0
+    """Time from the end of the exposure of the first row to that of the last: a rolling shutter. 0: all rows are exposed
+    at once. [s]"""
     vignetting: float = 0.0
     """Share of natural vignetting, cos^4 of the angle to the optical axis, that is not corrected."""
 

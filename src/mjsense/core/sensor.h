@@ -45,6 +45,10 @@ namespace mjsense::scene {
 class Scene;
 }  // namespace mjsense::scene
 
+namespace mjsense::worlds {
+class Worlds;
+}  // namespace mjsense::worlds
+
 namespace mjsense {
 
 class DebugShapes;
@@ -104,6 +108,7 @@ struct CastContext {
   rays::RayScene* rays;      // null for stage kBatch in a scene without ray casting
   std::span<const int> ids;  // sorted
   ThreadPool& pool;
+  const worlds::Worlds* worlds = nullptr;  // null if the sensor is used outside of a simulation
 };
 
 enum class Stage {

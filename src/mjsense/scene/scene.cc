@@ -12,6 +12,7 @@
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/named.h"
 #include "mjsense/scene/attach.h"
+#include "mjsense/scene/backdrop.h"
 #include "mjsense/scene/compiler_settings.h"
 #include "mjsense/scene/default_lighting.h"
 #include "mjsense/scene/mj_spec.h"
@@ -75,7 +76,7 @@ struct Scene::Impl {
   std::weak_ptr<void> claim;
 
   void build();
-  void attach();
+  void attach(const EntityCfg* backdrop);
   void set_options();
   void check_base_alone();
   void add(std::unique_ptr<Sensor> sensor);
@@ -85,9 +86,11 @@ struct Scene::Impl {
 
 void Scene::Impl::build() {
   std::vector<std::string> said;
+  std::optional<EntityCfg> backdrop;
+  if (!cfg.backdrop.empty()) backdrop = backdrop_entity(cfg.backdrop);  // it captures warnings too
   {
     WarningCapture capture(said);
-    attach();
+    attach(backdrop ? &*backdrop : nullptr);
   }
   for (std::string& text : said) {  // it is irrelevant to users which entity's <size> was used
     if (!text.starts_with("Attach conflict")) warnings.push_back(std::move(text));
@@ -127,8 +130,8 @@ void Scene::Impl::check_base_alone() {
                   fmt::join(settings, ", ")));
 }
 
-// Adds base, options, terrain and entities to the spec.
-void Scene::Impl::attach() {
+// Adds base, options, terrain, entities and the backdrop, if it is not null, to the spec.
+void Scene::Impl::attach(const EntityCfg* backdrop) {
   check_scene(cfg);
   spec = cfg.spec           ? SpecPtr(cfg.spec, SpecDelete{false})
          : cfg.base.empty() ? SpecPtr(mj_makeSpec())
@@ -145,6 +148,10 @@ void Scene::Impl::attach() {
     check_name(name, cfg.terrain.has_value(), attached);
     attached.push_back(attach_entity(spec.get(), name, entity, vfs, warnings));
   }
+  if (!backdrop) return;
+  const std::string name(kBackdrop);
+  check_name(name, cfg.terrain.has_value(), attached);
+  attached.push_back(attach_entity(spec.get(), name, *backdrop, vfs, warnings));
 }
 
 // Keys are unique; two sensors with the same name are always an error.

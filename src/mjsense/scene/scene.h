@@ -30,6 +30,8 @@ struct SceneCfg {
   std::optional<TerrainCfg> terrain;
   // Attached in this order, with the prefix "<name>/".
   std::vector<std::pair<std::string, EntityCfg>> entities;
+  // Path of a model that is only seen (backdrop.h); "": none.
+  std::string backdrop;
   std::vector<std::shared_ptr<const SensorCfg>> sensors;
   double env_spacing = 2.0;      // m, grid spacing of the world origins on a plane
   std::optional<double> extent;  // m, overrides stat.extent
@@ -51,6 +53,10 @@ void visit_fields(V& v, SceneCfg& c) {
       .at_least(0);
   v("terrain", c.terrain, "The ground; None adds no ground.");
   v("entities", c.entities, "Models by name; they are attached in this order.");
+  v("backdrop", c.backdrop,
+    "Surroundings that are only seen, an MJCF, .glb, .gltf or .obj file: cameras and rays show its "
+    "geoms, and nothing touches them. Its names get the prefix ``backdrop/``.")
+      .or_none();
   v.python("sensors", "Sequence[Any]", "()",
            "Sensor configurations, user-defined configurations with ``build()``, or "
            ":class:`mjsense.Sensor` objects.");

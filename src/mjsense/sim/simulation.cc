@@ -132,7 +132,9 @@ void Simulation::cast(std::span<Slot* const> slots, std::span<const int> ids, in
       if (due->ids.empty()) continue;
       const Timer timer(measure_cost_);
       try {
-        guarded(*slot->sensor, [&] { slot->sensor->cast({rays_.get(), due->ids, *pool_}); });
+        guarded(*slot->sensor, [&] {
+          slot->sensor->cast({rays_.get(), due->ids, *pool_, worlds_.get()});
+        });
       } catch (const RowError& e) {
         for (int w : due->ids) {
           if (std::ranges::find(e.faults, w, &RowError::Fault::world) == e.faults.end())

@@ -156,12 +156,15 @@ std::string recording_settings(const RecordJobCfg& job, Rollout& rollout) {
   if (!cfg.robot.empty()) settings["robot_file"] = checksums_of(task.robot);
   if (cfg.make_scene || !cfg.scene.empty())
     settings["scene_file"] = checksums_of(scenes::task_scene(task, ""));
-  if (cfg.camera_system.ends_with(".toml") || cfg.camera_system.ends_with(".json")) {
-    const std::string text = read_text_file(cfg.camera_system);
+  const auto add_file = [&](const char* key, const std::string& path) {
+    const std::string text = read_text_file(path);
     record::Checksum sum;
     sum.add(text.data(), text.size());
-    settings["camera_file"] = sum.text();
-  }
+    settings[key] = sum.text();
+  };
+  if (cfg.camera_system.ends_with(".toml") || cfg.camera_system.ends_with(".json"))
+    add_file("camera_file", cfg.camera_system);
+  if (!cfg.backdrop.empty()) add_file("backdrop_file", cfg.backdrop);
   if (cfg.shading != sensors::Shading::kClassic && render::is_environment_file(cfg.environment)) {
     const std::string bytes = render::read_environment_file(cfg.environment);
     record::Checksum sum;

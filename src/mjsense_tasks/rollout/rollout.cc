@@ -139,6 +139,7 @@ void Rollout::make() {
   camera_system_ = std::make_unique<cameras::CameraSystem>(choose_cameras(*task_, cfg_));
   cameras_ = recorded_cameras(*camera_system_);
   scene::SceneCfg scene_cfg = task_->scene_cfg_with_robot();
+  if (!cfg_.backdrop.empty()) scene_cfg.backdrop = cfg_.backdrop;
   for (std::size_t i = 0; i < cameras_.size(); ++i) {
     scene_cfg.sensors.push_back(std::make_shared<sensors::CameraSensorCfg>(
         camera_sensor_cfg(*camera_system_, static_cast<int>(i), cameras_[i], cfg_)));

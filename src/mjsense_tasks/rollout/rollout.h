@@ -67,6 +67,7 @@ struct RolloutCfg : sensors::ImageCfg {
   std::string arm_controller;
   std::string scene;
   std::string split;  // one of kSplits
+  std::string backdrop;
   std::string policy = "planner";
   int num_worlds = 1;
   int threads = 0;
@@ -122,6 +123,10 @@ void visit_fields(V& v, RolloutCfg& c) {
     "Part of the scene: ``train`` or ``test``, which have no kind of object in common; the same as "
     "``@train`` or ``@test`` after the scene's name.")
       .one_of(kSplits);
+  v("backdrop", c.backdrop,
+    "Surroundings of the scene that are only seen, an MJCF, .glb, .gltf or .obj file: nothing "
+    "touches its geoms.")
+      .decides_data();
   v("policy", c.policy, "Name of the policy.").decides_data();
   v("num_worlds", c.num_worlds, "Number of worlds that run in parallel.")
       .option("worlds")

@@ -11,6 +11,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/pose.h"
 #include "mjsense/core/text/name_matching.h"
+#include "mjsense/scene/backdrop.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense::tasks::scenes {
@@ -85,6 +86,8 @@ std::vector<SceneVariation::Part> SceneVariation::parts_of(const std::vector<Sce
     const std::string who = fmt::format("{}, vary {}", context, one.what.text());
     const Regex pattern(one.pattern, who);
     for (std::size_t i = 0; i < names.size(); ++i) {
+      if (scene::is_of_backdrop(names[i]))
+        continue;  // it belongs to the recording, not to the scene
       if (!names[i].empty() && pattern.fullmatch(names[i])) part.ids.push_back(static_cast<int>(i));
     }
     if (part.ids.empty() && one.optional) continue;

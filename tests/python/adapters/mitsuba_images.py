@@ -1,26 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Path-traced images compared with those of Mitsuba 3: a Cornell box, a grid of materials in the studio, a room with a window.
+"""Path-traced images compared with those of Mitsuba 3: a Cornell box, a grid of materials in the studio, a room with a window, a
+mesh with maps, a Panda at the table and the kitchen. How far images with shading pbr are from them is printed too.
 
-mitsuba_images.py [SAMPLES [FOLDER]] renders with SAMPLES per pixel, 4096 by default, and four times as many with Mitsuba, and stores the
-images in FOLDER.
+mitsuba_images.py [SAMPLES [FOLDER [SCENE ...]]] renders with SAMPLES per pixel, 4096 by default, and four times as many with Mitsuba,
+and stores the images in FOLDER: path, Mitsuba and pbr side by side.
 The material is written here a second time, as a BSDF for Mitsuba, which has no equal one.
 """
 
+import copy
 import os
 import subprocess
 import sys
 import time
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
-
-import mjsense as mjs
+from mitsuba_models import mapped_mesh, opened, plain_model, shapes
 
 SIZE = (64, 48)  # width, height
 FOVY = 40.0
 STUDIO = 0.3  # radiance of a white matte surface in the studio, relative to that of emission 1
 MINIMUM = 40.0  # dB
-ROOM_LIGHT = 900.0  # cd
 
 
 class Geom:
@@ -82,7 +83,7 @@ def walls(half, height, colors, window=False):
 
 
 def scenes():
-    """Name -> geoms, camera's (position, target), intensity of the studio, point light (position, radius)."""
+    """Name -> geoms, camera's (position, target), intensity of the studio, point light (position, radius, candela)."""
     white, red, green = (0.73, 0.73, 0.73), (0.6, 0.05, 0.05), (0.1, 0.45, 0.1)
     cornell = [
         *walls(1, 2, (white, white, red, green, white)),
@@ -104,41 +105,42 @@ def scenes():
     return {
         "cornell": (cornell, ((0, -4.2, 1), (0, 0, 1)), 0, None),
         "materials": (grid, ((0, -4, 1.4), (0, 0, 0.75)), 1, None),
-        "room": (room, ((-0.6, -1.4, 1.3), (0.1, 0.6, 0.7)), 4, ((-1, -1, 1.7), 0.1)),
+        "room": (room, ((-0.6, -1.4, 1.3), (0.1, 0.6, 0.7)), 4, ((-1, -1, 1.7), 0.1, 900)),
+        "mesh": (mapped_mesh(), ((0, -2.4, 1.3), (0, 0, 0.55)), 1, ((-1.5, -1.5, 2.5), 0.15, 900)),
+        "panda": (plain_model("pick", "franka", "table"), ((1.5, -0.9, 1.5), (0.3, 0, 0.7)), 1, ((1.2, 0.8, 2.2), 0.1, 300)),
+        "kitchen": (plain_model("open", "franka", "kitchen"), ((-1.2, -0.6, 1.6), (0.4, 0.3, 0.9)), 1, ((-0.6, -0.6, 2.1), 0.1, 300)),
     }
 
 
-def mjsense_image(geoms, camera, studio, light, samples):
+def mjsense_images(geoms, camera, studio, light, samples):
+    """Images with shading path and pbr."""
     eye, target = (np.array(x, float) for x in camera)
     back = (eye - target) / np.linalg.norm(eye - target)
     right = np.cross([0, 0, 1], back)
     right /= np.linalg.norm(right)
     axes = " ".join(str(x) for x in (*right, *np.cross(back, right)))
-    parts = [g.mjcf(i) for i, g in enumerate(geoms)]
+    view = f'<camera name="view" pos="{" ".join(str(x) for x in eye)}" xyaxes="{axes}" fovy="{FOVY}"/>'
     lamp = ""
     if light:
         place = " ".join(str(x) for x in light[0])
-        lamp = f'<light type="point" pos="{place}" bulbradius="{light[1]}" intensity="{ROOM_LIGHT}" range="1e6" diffuse="1 1 1"/>'
-    xml = (
-        f'<mujoco><compiler angle="degree"/><visual><headlight active="0"/></visual><asset>{"".join(p[0] for p in parts)}</asset>'
-        f"<worldbody>{lamp}{''.join(p[1] for p in parts)}"
-        f'<camera name="view" pos="{" ".join(str(x) for x in eye)}" xyaxes="{axes}" fovy="{FOVY}"/></worldbody></mujoco>'
+        lamp = f'<light type="point" pos="{place}" bulbradius="{light[1]}" intensity="{light[2]}" range="1e6" diffuse="1 1 1"/>'
+    model, files, state, maps = geoms if isinstance(geoms, tuple) else (simple_model(geoms), {}, {}, None)
+    options = {"width": SIZE[0], "height": SIZE[1], "samples_per_pixel": samples, "environment_intensity": studio, "samples": 16}
+    if maps is None:
+        options["use_textures"] = False
+    found = []
+    for shading in ("path", "pbr"):
+        sim, scene = opened(copy.deepcopy(model), files, state, view, lamp, shading=shading, **options)
+        found.append(scene["cam"].data.rgb[0].copy())
+    return sim, *found
+
+
+def simple_model(geoms):
+    parts = [g.mjcf(i) for i, g in enumerate(geoms)]
+    return ElementTree.fromstring(
+        f'<mujoco><compiler angle="degree"/><asset>{"".join(p[0] for p in parts)}</asset>'
+        f"<worldbody>{''.join(p[1] for p in parts)}</worldbody></mujoco>"
     )
-    cfg = mjs.CameraSensorCfg(
-        name="cam",
-        camera_name="w/view",
-        width=SIZE[0],
-        height=SIZE[1],
-        use_shadows=True,
-        shading="path",
-        samples_per_pixel=samples,
-        tone_mapping="linear",
-        environment_intensity=studio,
-    )
-    scene = mjs.Scene(mjs.SceneCfg(entities={"w": mjs.EntityCfg(model=xml)}, sensors=[cfg]))
-    sim = mjs.Simulation(scene, num_worlds=1)
-    sim.forward()
-    return scene["cam"].data.rgb[0].copy()
 
 
 def studio_radiance(z):
@@ -183,43 +185,57 @@ def register_material(mi, dr):
         return np.array(found)
 
     class MetallicRoughness(mi.BSDF):
+        """`base`, `metallic` and `roughness` are textures or numbers; `f0` is that of the dielectric part."""
+
         def __init__(self, props):
             mi.BSDF.__init__(self, props)
-            self.base = mi.Color3f(*props["base"])
-            self.metallic, roughness = props["metallic"], props["roughness"]
-            self.alpha = max(roughness, 0.045) ** 2
-            scale = lobe_scale(self.alpha)
-            self.a, self.b = (mi.Float(scale[:, k].astype(np.float32)) for k in (0, 1))
-            self.mean = float(np.mean(props["base"]))
+            self.base, self.metallic, self.roughness = props["base"], props["metallic"], props["roughness"]
+            self.f0 = props.get("f0", 0.04)
+            varies = isinstance(self.roughness, mi.Texture)
+            self.rows = 65 if varies else 1
+            rows = np.linspace(0, 1, 65) if varies else [self.roughness]
+            scales = np.concatenate([lobe_scale(max(x, 0.045) ** 2) for x in rows])
+            self.a, self.b = (mi.Float(scales[:, k].astype(np.float32)) for k in (0, 1))
             self.m_flags = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide
             self.m_components = [self.m_flags]
 
-        def parts(self, n_v):
+        def alpha(self, si):
+            return dr.maximum(number(self.roughness, si), 0.045) ** 2
+
+        def parts(self, si, n_v):
+            row = dr.clip(number(self.roughness, si), 0, 1) * (self.rows - 1)
+            first = dr.minimum(mi.UInt32(row), max(self.rows - 2, 0))
+            between = row - mi.Float(first)
             at = dr.clip(n_v, 0, 1) * 256
             low = dr.minimum(mi.UInt32(at), 255)
             part = at - mi.Float(low)
 
             def read(table):
-                left, right = dr.gather(mi.Float, table, low), dr.gather(mi.Float, table, low + 1)
-                return left + part * (right - left)
+                def along(k):
+                    left, right = (dr.gather(mi.Float, table, k * 257 + low + i) for i in (0, 1))
+                    return left + part * (right - left)
+
+                return along(first) if self.rows == 1 else along(first) * (1 - between) + along(first + 1) * between
 
             a, b = read(self.a), read(self.b)
             loss = 1 / dr.maximum(a + b, 1e-3) - 1
-            f0, m = 0.04, self.metallic
+            base = self.base.eval(si) if isinstance(self.base, mi.Texture) else mi.Color3f(*self.base)
+            f0, m = self.f0, number(self.metallic, si)
             plain0, plain90 = (1 + f0 * loss) * f0, (1 + f0 * loss) * min(1, 16.5 * f0)
             under = (1 - m) * dr.maximum(0, 1 - plain0 * a - plain90 * b)
-            metal = 1 + self.base * loss
-            low0 = (1 - m) * plain0 + m * metal * self.base
-            high = (1 - m) * plain90 + m * metal * min(1, 16.5 * self.mean)
-            return under * self.base, low0, high
+            metal = 1 + base * loss
+            low0 = (1 - m) * plain0 + m * metal * base
+            high = (1 - m) * plain90 + m * metal * dr.minimum(1, 16.5 * dr.mean(base))
+            return under * base, low0, high
 
-        def value(self, v, to_light):
-            n_v, n_l, a2 = dr.maximum(v.z, 1e-4), to_light.z, self.alpha**2
+        def value(self, si, to_light):
+            v = si.wi
+            n_v, n_l, a2 = dr.maximum(v.z, 1e-4), to_light.z, self.alpha(si) ** 2
             h = dr.normalize(v + to_light)
             t = h.z * h.z * (a2 - 1) + 1
             d = a2 / (dr.pi * t * t)
             smith = 0.5 / (n_l * dr.sqrt(n_v * n_v * (1 - a2) + a2) + n_v * dr.sqrt(n_l * n_l * (1 - a2) + a2))
-            matte, low, high = self.parts(n_v)
+            matte, low, high = self.parts(si, n_v)
             fresnel = (1 - dr.clip(dr.dot(v, h), 0, 1)) ** 5
             masking = 2 * n_v / (n_v + dr.sqrt(n_v * n_v * (1 - a2) + a2))
             pdf = 0.5 * n_l / dr.pi + 0.5 * masking * d / (4 * n_v)
@@ -228,30 +244,32 @@ def register_material(mi, dr):
             return good, dr.select(good, color, 0), dr.select(good, pdf, 0)
 
         def sample(self, ctx, si, sample1, sample2, active):
-            v = si.wi
-            normal = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, self.alpha, True).sample(v, sample2)[0]
-            mirrored = mi.reflect(v, normal)
+            normal = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, self.alpha(si), True).sample(si.wi, sample2)[0]
+            mirrored = mi.reflect(si.wi, normal)
             to_light = dr.select(sample1 < 0.5, mirrored, mi.warp.square_to_cosine_hemisphere(sample2))
-            good, color, pdf = self.value(v, to_light)
+            good, color, pdf = self.value(si, to_light)
             bs = mi.BSDFSample3f()
             bs.wo, bs.pdf, bs.eta = to_light, pdf, 1.0
             bs.sampled_type, bs.sampled_component = mi.UInt32(+self.m_flags), mi.UInt32(0)
             return bs, dr.select(active & good & (pdf > 0), color / pdf, 0)
 
         def eval(self, ctx, si, wo, active):
-            return dr.select(active, self.value(si.wi, wo)[1], 0)
+            return dr.select(active, self.value(si, wo)[1], 0)
 
         def pdf(self, ctx, si, wo, active):
-            return dr.select(active, self.value(si.wi, wo)[2], 0)
+            return dr.select(active, self.value(si, wo)[2], 0)
 
         def eval_pdf(self, ctx, si, wo, active):
-            _, color, pdf = self.value(si.wi, wo)
+            _, color, pdf = self.value(si, wo)
             return dr.select(active, color, 0), dr.select(active, pdf, 0)
+
+    def number(value, si):
+        return value.eval_1(si) if isinstance(value, mi.Texture) else mi.Float(value)
 
     mi.register_bsdf("metallic_roughness", MetallicRoughness)
 
 
-def mitsuba_image(mi, geoms, camera, studio, light, samples):
+def mitsuba_image(mi, sim, geoms, camera, studio, light, samples):
     scene = {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": -1},
@@ -264,15 +282,17 @@ def mitsuba_image(mi, geoms, camera, studio, light, samples):
             "film": {"type": "hdrfilm", "width": SIZE[0], "height": SIZE[1], "rfilter": {"type": "box"}},
         },
     }
-    for i, geom in enumerate(geoms):
-        scene[f"geom{i}"] = geom.mitsuba(mi)
+    if isinstance(geoms, tuple):
+        scene |= shapes(mi, sim, geoms[3])
+    else:
+        scene |= {f"geom{i}": geom.mitsuba(mi) for i, geom in enumerate(geoms)}
     if studio:
         z = np.cos((np.arange(1024) + 0.5) / 1024 * np.pi)
         image = np.repeat(studio_radiance(z)[:, None, None] * STUDIO * studio, 16, 1).repeat(3, 2).astype(np.float32)
         turned = mi.ScalarTransform4f().rotate([1, 0, 0], 90)
         scene["studio"] = {"type": "envmap", "bitmap": mi.Bitmap(image), "to_world": turned}
     if light:
-        radiance = ROOM_LIGHT / 307.2 / (np.pi * light[1] ** 2)
+        radiance = light[2] / 307.2 / (np.pi * light[1] ** 2)
         scene["lamp"] = {
             "type": "sphere",
             "center": list(light[0]),
@@ -291,6 +311,13 @@ def psnr(a, b):
     return 10 * np.log10(255**2 / np.mean((a.astype(float) - b) ** 2))
 
 
+def flip(a, b):
+    """The mean of NVIDIA's FLIP, at its default distance."""
+    import flip_evaluator
+
+    return flip_evaluator.evaluate(b.astype(np.float32) / 255, a.astype(np.float32) / 255, "LDR")[1]
+
+
 def main():
     samples = int(sys.argv[1]) if len(sys.argv) > 1 else 4096
     probe = "import mitsuba as mi; mi.set_variant('llvm_ad_rgb'); mi.render(mi.load_dict(mi.cornell_box()), spp=1).numpy()"
@@ -305,19 +332,23 @@ def main():
     import drjit as dr
 
     register_material(mi, dr)
+    wanted = sys.argv[3:]
     good = True
     for name, scene in scenes().items():
+        if wanted and name not in wanted:
+            continue
         start = time.perf_counter()
-        ours = mjsense_image(*scene, samples)
+        sim, path, pbr = mjsense_images(*scene, samples)
         between = time.perf_counter()
-        theirs = mitsuba_image(mi, *scene, 4 * samples)
-        decibels = psnr(ours, theirs)
+        theirs = mitsuba_image(mi, sim, *scene, 4 * samples)
+        decibels = psnr(path, theirs)
         good &= decibels >= MINIMUM
-        print(f"{name}: PSNR {decibels:.1f} dB, {between - start:.1f} s, Mitsuba {time.perf_counter() - between:.1f} s", flush=True)
+        seconds = f"{between - start:.1f} s, Mitsuba {time.perf_counter() - between:.1f} s"
+        print(f"{name}: path PSNR {decibels:.1f} dB; pbr PSNR {psnr(pbr, theirs):.1f} dB, FLIP {flip(pbr, theirs):.3f}; {seconds}", flush=True)
         if len(sys.argv) > 2:
             folder = Path(sys.argv[2])
             folder.mkdir(parents=True, exist_ok=True)
-            mi.Bitmap(np.hstack([ours, theirs])).write(str(folder / f"{name}.png"))
+            mi.Bitmap(np.hstack([path, theirs, pbr])).write(str(folder / f"{name}.png"))
     # Leaving the interpreter with Dr.Jit loaded can take long.
     sys.stdout.flush()
     os._exit(0 if good else 1)

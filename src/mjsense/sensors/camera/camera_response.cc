@@ -26,28 +26,34 @@ double falloff(const render::PixelGrid& grid, int x, int y) {
   return square * square;
 }
 
-}  // namespace
-
+// The values of a camera.
 ImagerCfg imager_preset(Imager imager) {
   // f_number: Intel, RealSense D400 Series data sheet (337029), colour sensor of the D435; that of the ZED
   // Mini is an assumption. exposure_time: both take 30 images per second. full_well and read_noise: not
   // published for the OV2740 (1.4 um pixels) and OV4689 (2 um) in them. Those of OmniVision's OV5647, which
   // has 1.4 um pixels, are 4300 electrons and 68 dB, thus 4300 / 10^(68 / 20) = 1.7 electrons; for 2 um,
   // the full well grows with the area. bits: both sensors have 10 bits. vignetting: half of the natural
-  // one, because the cameras correct a part that is not published.
+  // one, because the cameras correct a part that is not published. readout_time: at their highest rates
+  // the sensors read all rows 60 times (OV2740, 1920 x 1080) and 90 times (OV4689, 2688 x 1520) a second.
   ImagerCfg out;
   out.full_well = imager == Imager::kZedMini ? 4300 * (2.0 * 2.0) / (1.4 * 1.4) : 4300;
   out.read_noise = 1.7;
   out.bits = 10;
   out.f_number = 2.0;
   out.exposure_time = 1.0 / 30;
+  out.readout_time = imager == Imager::kZedMini ? 1.0 / 90 : 1.0 / 60;
   out.vignetting = 0.5;
   return out;
 }
 
+}  // namespace
+
+std::optional<ImagerCfg> imager_of(const CameraSensorCfg& cfg) {
+  return cfg.imager == Imager::kNone ? cfg.imager_values : imager_preset(cfg.imager);
+}
+
 bool needs_response(const CameraSensorCfg& cfg) {
-  return cfg.exposure_mode == ExposureMode::kAuto || cfg.imager != Imager::kNone ||
-         cfg.imager_values;
+  return cfg.exposure_mode == ExposureMode::kAuto || imager_of(cfg);
 }
 
 CameraResponse::CameraResponse(const CameraSensorCfg& cfg, const render::PhysicalOptions& options,
@@ -57,9 +63,8 @@ CameraResponse::CameraResponse(const CameraSensorCfg& cfg, const render::Physica
       automatic_(cfg.exposure_mode == ExposureMode::kAuto),
       exposure_(cfg.exposure),
       time_constant_(cfg.exposure_time_constant),
-      imager_(cfg.imager_values),
+      imager_(imager_of(cfg)),
       states_(num_worlds) {
-  if (cfg.imager != Imager::kNone) imager_ = imager_preset(cfg.imager);
   constexpr double kIdentity[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   render::set_physical(options, {1, 1, 1}, kIdentity, display_);
 }
@@ -67,6 +72,19 @@ CameraResponse::CameraResponse(const CameraSensorCfg& cfg, const render::Physica
 void CameraResponse::keep_radiance() {
   for (State& state : states_)
     state.radiance.resize(3 * static_cast<std::size_t>(width_) * height_);
+}
+
+double CameraResponse::exposure_time(int world, double time) const {
+  const State& state = states_[world];
+  double exposure = exposure_;
+  if (automatic_) {
+    // An image of the same time will be replaced.
+    const int before = state.images - (state.images > 0 && time == state.time);
+    if (before <= 0 || time < state.time) return imager_->exposure_time;
+    exposure = time == state.time ? state.earlier_exposure : state.exposure;
+  }
+  return std::min(imager_->exposure_time,
+                  imager_->f_number * imager_->f_number / std::exp2(exposure));
 }
 
 double CameraResponse::metered(const float* radiance) const {

@@ -26,8 +26,8 @@
 
 namespace mjsense::sensors {
 
-// The values of a camera.
-ImagerCfg imager_preset(Imager imager);
+// The image sensor of a camera; empty: none.
+std::optional<ImagerCfg> imager_of(const CameraSensorCfg& cfg);
 
 // What CameraResponse does not do is done by the kernels.
 bool needs_response(const CameraSensorCfg& cfg);
@@ -42,6 +42,9 @@ class CameraResponse {
   // Where the radiance of a world's images is kept if they have no field for it: [H, W, 3], cd/m^2.
   float* radiance(int world) { return states_[world].radiance.data(); }
   void keep_radiance();
+  // s, of the world's next image, which is taken at `time`. With automatic exposure it follows from
+  // the exposure of the last image; the first one has the longest.
+  double exposure_time(int world, double time) const;
 
   // Writes rgb [H, W, 3] for an image at `time`, s, with this radiance.
   void develop(int world, double time, const render::PixelGrid& grid, Rng rng,

@@ -98,6 +98,7 @@ void CameraSensor::initialize(const SensorInit& init) {
   if (cfg_.depth_noise != DepthNoise::kNone)
     clean_.assign(init.threads,
                   std::vector<float>(static_cast<std::size_t>(cfg_.width) * cfg_.height));
+  prepare_motion(init);
   gl_.reset();
   workspace_.reset();
   if (cfg_.renderer == CameraRenderer::kOpenGl) {
@@ -169,13 +170,23 @@ std::unique_ptr<render::GlRenderer> CameraSensor::make_gl_renderer(int num_world
   return render::make_gl_renderer(model_, gl, context());
 }
 
+void CameraSensor::prepare_motion(const SensorInit& init) {
+  motion_.reset();
+  const std::optional<ImagerCfg> imager = imager_of(cfg_);
+  if (rgb_ && imager && cfg_.motion_samples > 0)
+    motion_ = std::make_unique<CameraMotion>(model_, cfg_, *imager, marker_options(cfg_),
+                                             init.num_worlds, init.threads, context());
+}
+
 // Prepares the parts of images that are kept for later ones, where the camera cannot move.
 void CameraSensor::prepare_layers(int num_worlds) {
   const bool fixed =
       cfg_.shading != Shading::kPath && render::FixedLayer::possible(model_, camera_);
   changed_tiles_.clear();
-  // The other fields follow from images that are not stored.
-  if (fixed && !optical_flow_ && !owners_ && clean_.empty()) changed_tiles_.resize(num_worlds);
+  // The other fields follow from images that are not stored. If something may move during an
+  // exposure, the tiles are those of its instants.
+  if (fixed && (motion_ || (!optical_flow_ && !owners_ && clean_.empty())))
+    changed_tiles_.resize(num_worlds);
   fixed_layers_.reset();
   if (colored() && cfg_.samples == 1 && fixed)
     fixed_layers_ =
@@ -195,7 +206,7 @@ void CameraSensor::allocate_workspace(const SensorInit& init) {
   response_.reset();
   if (rgb_ && needs_response(cfg_)) {
     response_ = std::make_unique<CameraResponse>(cfg_, options.physical, init.num_worlds);
-    if (!hdr_) response_->keep_radiance();
+    if (motion_ || !hdr_) response_->keep_radiance();
   }
   options.layered = fixed_layers_ != nullptr;
   for (int i = 0; i < slots; ++i) workspace_->builders.emplace_back(model_, *assets_, options);
@@ -288,10 +299,12 @@ bool CameraSensor::is_due(const World& world, std::int64_t& image) const {
 void CameraSensor::reset(const World& world) {
   if (optical_flow_) optical_flow_->reset(world.id);
   if (response_) response_->reset(world.id);
+  if (motion_) motion_->clear(world.id);
 }
 
 void CameraSensor::compute(const World& world) {
   PerWorld& w = worlds_[world.id];
+  if (motion_) motion_->remember(world);
   w.due |= is_due(world, w.image);  // an image that was due but not rendered is still due
   if (!w.due) return;
   const mjModel* m = world.model;
@@ -322,8 +335,13 @@ void CameraSensor::compute(const World& world) {
 // Targets in the fields of this world; buffers of this thread for those that only derive() needs.
 render::ImageTargets CameraSensor::targets(int world, int thread) {
   render::ImageTargets t;
+  t.samples = cfg_.samples;
+  if (instant_ >= 0) {
+    t.hdr = motion_->image(world);
+    return t;
+  }
   if (response_) {
-    t.hdr = response_->radiance(world);
+    if (!motion_) t.hdr = response_->radiance(world);
   } else if (rgb_) {
     t.rgb = rgb_->data.row<std::uint8_t>(world).data();
   }
@@ -333,19 +351,21 @@ render::ImageTargets CameraSensor::targets(int world, int thread) {
   if (normals_) t.normals = normals_->data.row<float>(world).data();
   if (points_) t.points = points_->data.row<float>(world).data();
   t.depth_along_ray = cfg_.depth_kind == DepthKind::kRay;
-  t.samples = cfg_.samples;
   if (optical_flow_) optical_flow_->complete(t, thread);
   if (owners_) owners_->complete(t, thread);
   return t;
 }
 
-const render::View& CameraSensor::build_view(const rays::RayScene& rays, int world,
-                                             render::ViewBuilder& builder) const {
-  const rays::RayWorld& state = rays.world(world);
-  const rays::RayCamera& camera = state.cameras()[camera_];
+const render::View& CameraSensor::build_view(const CastContext& context, int world,
+                                             render::ViewBuilder& builder, int thread) const {
   const PerWorld& w = worlds_[world];
-  const render::View& view = builder.build(state, rays.shared(), w.appearance, w.markers.all(),
-                                           camera.pos, camera.mat, w.grid);
+  const bool present = instant_ < 0 || motion_->instants(world) == 1;
+  const CameraMotion::Scene scene =
+      present ? CameraMotion::Scene{context.rays->world(world), w.markers.all()}
+              : motion_->at(world, instant_, thread);
+  const rays::RayCamera& camera = scene.state.cameras()[camera_];
+  const render::View& view = builder.build(scene.state, context.rays->shared(), w.appearance,
+                                           scene.markers, camera.pos, camera.mat, w.grid);
   if (fixed_layers_) builder.use_fixed(fixed_layers_->find(world, view));
   if (!workspace_->paths.empty())
     workspace_->paths[&builder - workspace_->builders.data()].build(view);
@@ -359,9 +379,8 @@ void CameraSensor::make_fixed(const render::View& view, render::FixedTile* tiles
   workspace_->render(view, targets, first, last, workspace_->memory[thread].scratch());
 }
 
-void CameraSensor::settle_common_layer(const CastContext& context, int tile_rows) {
-  const int world = due_[0];
-  const render::View& view = build_view(*context.rays, world, workspace_->builders[0]);
+void CameraSensor::settle_common_layer(const CastContext& context, int world, int tile_rows) {
+  const render::View& view = build_view(context, world, workspace_->builders[0], 0);
   render::FixedTile* tiles = fixed_layers_->settle_common(world, view);
   if (!tiles) return;
   context.pool.run(tile_rows,
@@ -376,7 +395,9 @@ void CameraSensor::cast(const CastContext& context) {
   due_.clear();
   for (int id : context.ids)
     if (worlds_[id].due) due_.push_back(id);
-  render_due(context);
+  if (motion_) expose(context);
+  // rgb, intrinsics and pose: an exposed image has no others
+  if (!motion_ || fields().size() > 3) render_images(context, due_);
   if (response_) develop(context);
   if (!clean_.empty()) add_noise(context);
   for (int id : due_) worlds_[id].due = false;
@@ -386,9 +407,10 @@ void CameraSensor::develop(const CastContext& context) {
   context.pool.run(static_cast<int>(due_.size()), [&](int item, int) {
     const int id = due_[item];
     const PerWorld& w = worlds_[id];
-    response_->develop(id, w.time, w.grid, w.colour_rng,
-                       hdr_ ? hdr_->data.row<float>(id).data() : response_->radiance(id),
-                       rgb_->data.row<std::uint8_t>(id).data());
+    response_->develop(
+        id, w.time, w.grid, w.colour_rng,
+        hdr_ && !motion_ ? hdr_->data.row<float>(id).data() : response_->radiance(id),
+        rgb_->data.row<std::uint8_t>(id).data());
   });
 }
 
@@ -404,7 +426,14 @@ void CameraSensor::add_noise(const CastContext& context) {
 void CameraSensor::render_rows(int slot, int world, int first, int last, int thread) {
   const render::View& view = workspace_->builders[slot].view();
   render::ImageTargets image = targets(world, thread);
-  if (!workspace_->paths.empty()) {
+  const int height = cfg_.height, size = render::kTileSize;
+  if (instant_ >= 0) {
+    const CameraMotion::Rows rows = motion_->rows(world, instant_);
+    first = std::max(first, rows.first / size);
+    last = std::min(last, (rows.last + size - 1) / size);
+    if (first >= last) return;
+  }
+  if (!workspace_->paths.empty() && (image.rgb || image.hdr)) {
     workspace_->paths[slot].render(first, last, image);
     image.rgb = nullptr;
     image.hdr = nullptr;
@@ -413,8 +442,19 @@ void CameraSensor::render_rows(int slot, int world, int first, int last, int thr
     image.changed_tiles = tiles->changed();
     image.receivers = tiles->receivers();
   }
-  workspace_->render(view, image, first, last, workspace_->memory[thread].scratch());
-  derive(world, image, first * render::kTileSize, std::min(last * render::kTileSize, cfg_.height));
+  if (instant_ < 0) {
+    workspace_->render(view, image, first, last, workspace_->memory[thread].scratch());
+    derive(world, image, first * size, std::min(last * size, height));
+    return;
+  }
+  // Only rows of tiles that show the instant before have other tiles that are kept.
+  const CameraMotion::Rows before = motion_->rendered(world);
+  for (int row = first; row < last && image.hdr; ++row) {
+    render::ImageTargets part = image;
+    if (before.first >= (row + 1) * size || before.last <= row * size) part.changed_tiles = nullptr;
+    workspace_->render(view, part, row, row + 1, workspace_->memory[thread].scratch());
+  }
+  motion_->add(world, instant_, first * size, last * size, response_->radiance(world));
 }
 
 // Computes the fields that follow from depth and ids, for pixel rows [first, last).
@@ -429,32 +469,46 @@ void CameraSensor::derive(int world, const render::ImageTargets& image, int firs
   }
 }
 
-void CameraSensor::render_due(const CastContext& context) {
-  const rays::RayScene& rays = *context.rays;
+void CameraSensor::expose(const CastContext& context) {
+  int instants = 0;
+  for (int id : due_)
+    instants = std::max(instants,
+                        motion_->plan(context, id, response_->exposure_time(id, worlds_[id].time)));
+  for (instant_ = instants - 1; instant_ >= 0; --instant_) {
+    exposed_.clear();
+    for (int id : due_)
+      if (motion_->instants(id) > instant_) exposed_.push_back(id);
+    render_images(context, exposed_);
+    for (int id : exposed_) motion_->keep(id, instant_);
+  }
+}
+
+void CameraSensor::render_images(const CastContext& context, std::span<const int> images) {
   if (gl_) {
-    for (int id : due_) {
+    for (int id : images) {
       const render::ImageTargets image = targets(id, 0);
-      gl_->render(id, rays.world(id), worlds_[id].markers.geoms(), image);
+      gl_->render(id, context.rays->world(id), worlds_[id].markers.geoms(), image);
       derive(id, image, 0, cfg_.height);
     }
     return;
   }
-  const int count = static_cast<int>(due_.size());
+  const int count = static_cast<int>(images.size());
+  if (count == 0) return;
   const int tile_rows = (cfg_.height + render::kTileSize - 1) / render::kTileSize;
   const int threads = context.pool.size();
   Workspace& work = *workspace_;
-  if (fixed_layers_ && count > 0) settle_common_layer(context, tile_rows);
+  if (fixed_layers_) settle_common_layer(context, images[0], tile_rows);
   if (threads == 1 || count >= kImagesPerThread * threads) {
     context.pool.run(count, [&](int item, int thread) {
       render::ViewBuilder& builder = work.builders[thread];
-      const render::View& view = build_view(rays, due_[item], builder);
-      render::ChangedTiles* changed = changed_tiles(due_[item]);
+      const render::View& view = build_view(context, images[item], builder, thread);
+      render::ChangedTiles* changed = changed_tiles(images[item]);
       if (changed) changed->compare(view);
-      if (render::FixedTile* tiles = settle_layer(due_[item], view)) {
+      if (render::FixedTile* tiles = settle_layer(images[item], view)) {
         make_fixed(view, tiles, 0, tile_rows, thread);
         builder.use_fixed(tiles);
       }
-      render_rows(thread, due_[item], 0, tile_rows, thread);
+      render_rows(thread, images[item], 0, tile_rows, thread);
       if (changed) changed->keep(view);
     });
     return;
@@ -467,10 +521,10 @@ void CameraSensor::render_due(const CastContext& context) {
       body(image, band * tile_rows / bands, (band + 1) * tile_rows / bands, thread);
     });
   };
-  context.pool.run(count, [&](int item, int) {
-    const render::View& view = build_view(rays, due_[item], work.builders[item]);
-    if (render::ChangedTiles* changed = changed_tiles(due_[item])) changed->compare(view);
-    work.making[item] = settle_layer(due_[item], view);
+  context.pool.run(count, [&](int item, int thread) {
+    const render::View& view = build_view(context, images[item], work.builders[item], thread);
+    if (render::ChangedTiles* changed = changed_tiles(images[item])) changed->compare(view);
+    work.making[item] = settle_layer(images[item], view);
   });
   const auto making = std::span(work.making).first(count);
   if (std::ranges::any_of(making, [](render::FixedTile* tiles) { return tiles != nullptr; })) {
@@ -482,11 +536,11 @@ void CameraSensor::render_due(const CastContext& context) {
       if (making[i]) work.builders[i].use_fixed(making[i]);
   }
   run_bands([&](int image, int first, int last, int thread) {
-    render_rows(image, due_[image], first, last, thread);
+    render_rows(image, images[image], first, last, thread);
   });
-  if (changed_tiles_.empty()) return;
+  if (!changed_tiles(images[0])) return;
   context.pool.run(
-      count, [&](int item, int) { changed_tiles_[due_[item]].keep(work.builders[item].view()); });
+      count, [&](int item, int) { changed_tiles(images[item])->keep(work.builders[item].view()); });
 }
 
 }  // namespace mjsense::sensors

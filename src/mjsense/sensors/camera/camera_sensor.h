@@ -14,6 +14,7 @@
 #include "mjsense/render/view/markers.h"
 #include "mjsense/render/view/surface_assets.h"
 #include "mjsense/render/view/view_builder.h"
+#include "mjsense/sensors/camera/camera_motion.h"
 #include "mjsense/sensors/camera/camera_response.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
 #include "mjsense/sensors/camera/optical_flow.h"
@@ -37,6 +38,8 @@ class CameraSensor final : public Sensor {
   // A camera with its own rate must process every control step, because between two images it shows
   // the older one.
   bool needs_every_step() const override { return cfg_.update_period > 0; }
+  bool wants_substep() const override { return motion_ != nullptr; }
+  void substep(const World& world) override { motion_->remember(world); }
   void edit_spec(mjSpec* spec) override;
   void initialize(const SensorInit& init) override;
   void compute(const World& world) override;
@@ -67,11 +70,15 @@ class CameraSensor final : public Sensor {
   void set_clip_planes();
   void prepare_grids(const SensorInit& init);
   std::unique_ptr<render::GlRenderer> make_gl_renderer(int num_worlds) const;
+  void prepare_motion(const SensorInit& init);
   void prepare_layers(int num_worlds);
   void allocate_workspace(const SensorInit& init);
   std::size_t max_markers() const;  // of a world
   void declare_fields(int num_worlds);
-  void render_due(const CastContext& context);
+  // Renders the radiance of the due images of an image sensor, instant by instant.
+  void expose(const CastContext& context);
+  // Renders images of these worlds at instant_.
+  void render_images(const CastContext& context, std::span<const int> images);
   void add_noise(const CastContext& context);
   void develop(const CastContext& context);
   render::PixelGrid grid_in(const mjModel* model) const;
@@ -85,14 +92,15 @@ class CameraSensor final : public Sensor {
   // Renders rows of tiles [first, last) of the fixed geoms of a view.
   void make_fixed(const render::View& view, render::FixedTile* tiles, int first, int last,
                   int thread);
-  void settle_common_layer(const CastContext& context, int tile_rows);
+  void settle_common_layer(const CastContext& context, int world, int tile_rows);
   // Tiles of the world's own layer that must be rendered first; null: none.
   render::FixedTile* settle_layer(int world, const render::View& view);
-  const render::View& build_view(const rays::RayScene& rays, int world,
-                                 render::ViewBuilder& builder) const;
+  const render::View& build_view(const CastContext& context, int world,
+                                 render::ViewBuilder& builder, int thread) const;
   // The world's tiles that may have changed since its last image; null: all tiles are rendered.
   render::ChangedTiles* changed_tiles(int world) {
-    return changed_tiles_.empty() ? nullptr : &changed_tiles_[world];
+    const bool kept = !changed_tiles_.empty() && (!motion_ || instant_ >= 0);
+    return kept ? &changed_tiles_[world] : nullptr;
   }
 
   CameraSensorCfg cfg_;
@@ -101,7 +109,7 @@ class CameraSensor final : public Sensor {
   double near_ = 0, far_ = 0;  // m, clipping planes; far 0: none
   std::vector<PerWorld> worlds_;
   std::vector<float> distorted_rays_;
-  std::vector<int> due_;
+  std::vector<int> due_, exposed_;
   std::vector<std::vector<float>> clean_;  // by thread: true depth of one image; only with noise
   std::shared_ptr<const render::SurfaceAssets> assets_;
   std::unique_ptr<render::GlRenderer> gl_;  // only with renderer "opengl"
@@ -111,6 +119,8 @@ class CameraSensor final : public Sensor {
   std::unique_ptr<OpticalFlow> optical_flow_;          // null: not requested
   std::unique_ptr<PixelOwners> owners_;                // null: not requested
   std::unique_ptr<CameraResponse> response_;           // null: the kernels make the colours
+  std::unique_ptr<CameraMotion> motion_;               // null: nothing moves during an exposure
+  int instant_ = -1;  // of the exposure that is rendered; -1: the present
   Field *rgb_ = nullptr, *hdr_ = nullptr, *depth_ = nullptr, *segmentation_ = nullptr,
         *bodies_ = nullptr, *entities_ = nullptr, *normals_ = nullptr, *points_ = nullptr,
         *flow_ = nullptr;

@@ -90,11 +90,13 @@ struct ImagerCfg {
   int bits = 10;
   double f_number = 2;
   double exposure_time = 1.0 / 30;
+  double readout_time = 0;
   double vignetting = 0;
 };
 template <class V>
 void visit_fields(V& v, ImagerCfg& c) {
-  v.object("ImagerCfg", "The image sensor of a camera: noise, quantisation and vignetting.")
+  v.object("ImagerCfg",
+           "The image sensor of a camera: noise, quantisation, vignetting and shutter.")
       .frozen();
   v("full_well", c.full_well, "Electrons of a saturated pixel.").unit("electrons").positive();
   v("read_noise", c.read_noise, "Standard deviation of the noise of reading a pixel.")
@@ -106,6 +108,11 @@ void visit_fields(V& v, ImagerCfg& c) {
     "Longest exposure; darker images than it allows are amplified.")
       .unit("s")
       .positive();
+  v("readout_time", c.readout_time,
+    "Time from the end of the exposure of the first row to that of the last: a rolling shutter. 0: "
+    "all rows are exposed at once.")
+      .unit("s")
+      .at_least(0);
   v("vignetting", c.vignetting,
     "Share of natural vignetting, cos^4 of the angle to the optical axis, that is not corrected.")
       .within(0, 1);

@@ -40,6 +40,7 @@ struct RgbCfg {
   NamedEnum<ExposureMode> exposure_mode;
   double exposure_time_constant = 0.5;
   NamedEnum<Imager> imager;
+  int motion_samples = 8;
   NamedEnum<ToneMap> tone_mapping = ToneMap::kFilmic;
   double white_balance = 6504;
   std::string environment = "model";
@@ -83,7 +84,13 @@ void visit_fields(V& v, RgbCfg& c) {
       .within(0, 1e6)
       .decides_data();
   v("imager", c.imager,
-    "Photon and read noise, vignetting and quantisation of the colour sensor of a real camera.")
+    "Colour sensor of a real camera: photon and read noise, vignetting, quantisation, motion blur "
+    "and rolling shutter.")
+      .decides_data();
+  v("motion_samples", c.motion_samples,
+    "Instants of an exposure of which an image with ``imager`` is the mean, where something moves; "
+    "0: neither motion blur nor rolling shutter.")
+      .within(0, 64)
       .decides_data();
   v("tone_mapping", c.tone_mapping,
     "From radiance to colours. neutral: keeps the colours of materials; filmic: soft contrast; "
