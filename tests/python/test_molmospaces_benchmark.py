@@ -176,7 +176,7 @@ def test_scenes_that_are_not_there_are_one_error(tmp_path, specs, message):
     (lambda s: s["robot"].update(init_qpos={"arm": [0] * 101}), "expected at most 100 numbers"), (lambda s: s["robot"].update(init_qpos=[1]), "init_qpos is a list; expected an object"),
     (lambda s: s["cameras"][0].update(name="../x"), r"name is '\.\./x'; expected letters"), (lambda s: s["cameras"].append(s["cameras"][0]), "two cameras have the same name"),
     (lambda s: s["cameras"][0].update(camera_quaternion=[0] * 4), "camera_quaternion is 0"), (lambda s: s["cameras"][0].update(type="hidden"), "type is 'hidden'; expected robot_mounted or exocentric"),
-    (lambda s: s["language"].update(task_description="a\x1b[2J"), "expected a text of 1 to 1000 printable characters"), (lambda s: s["scene_modifications"].update(object_poses={"x\n": [0] * 7}), "no name of 1 to 200 printable"),
+    (lambda s: s["language"].update(task_description="a\x1b[2J"), "expected a text of 1 to 1000 printable characters"), (lambda s: s["scene_modifications"].update(object_poses={"x\n": [0] * 7}), "cannot be a name, which has 1 to 200 printable"),
     (lambda s: s["scene_modifications"].update(object_poses={"x": {}}), "x is an object; expected 7 numbers"), (lambda s: s["scene_modifications"].update(removed_objects="all"), "removed_objects is a text"),
     (lambda s: s.update(cameras=[{}] * 33), "expected a list of at most 32 objects"), (lambda s: s.update(mjsense={"episode": True}), "episode is true or false"),
 ], ids=range(22))  # fmt: skip

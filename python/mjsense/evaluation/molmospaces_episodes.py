@@ -255,7 +255,7 @@ def _numbers(table: _Reader) -> dict[str, float]:
 
 def _checked_name(name: Any, place: str) -> str:
     if not isinstance(name, str) or not 0 < len(name) <= _NAME or not name.isprintable():
-        raise ValueError(f"{place}: {bounded_json.kind_of(name)} is no name of 1 to {_NAME} printable characters")
+        raise ValueError(f"{place}: {bounded_json.kind_of(name)} cannot be a name, which has 1 to {_NAME} printable characters")
     return name
 
 

@@ -16,7 +16,7 @@
 
 namespace mjsense::tasks::episode {
 
-// What is left out stays as it was sampled. Names of bodies and joints are those of the model, or
+// Members that are left out keep what was sampled. Names of bodies and joints are those of the model, or
 // their part after a '/', if no other name of the model ends with it.
 struct GivenStart {
   std::map<std::string, Pose> bodies;                // of free bodies, in the world frame
