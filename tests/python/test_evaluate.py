@@ -214,9 +214,11 @@ def benchmark(tmp_path):
 
 
 def test_a_benchmark_fixes_its_episodes(benchmark, tmp_path):
-    for name, worlds in (("a", 1), ("b", 2)):
-        evaluate(benchmark.folder, policy=Counting(), out=tmp_path / name, num_worlds=worlds, progress=False)
-    one, other = (mjs.Dataset(tmp_path / name).episodes for name in "ab")
+    found = {}
+    for name, worlds in (("a", 1), ("b", 4), ("c", 16)):
+        found[name] = evaluate(benchmark.folder, policy=Counting(), out=tmp_path / name, num_worlds=worlds, progress=False)
+    assert rows(found["a"]) == rows(found["b"]) == rows(found["c"])
+    one, other = (mjs.Dataset(tmp_path / name).episodes for name in "ac")
     assert [episode.number for episode in one] == benchmark.episodes
     for mine, theirs, start in zip(one, other, mjs.Dataset(benchmark.folder / "starts").episodes, strict=True):
         np.testing.assert_array_equal(mine.states, theirs.states)

@@ -173,13 +173,15 @@ def test_scenes_that_are_not_there_are_one_error(tmp_path, specs, message):
     (lambda s: s["task"].update(task_cls="os.system"), "task_cls is 'system'; mjsense plays"), (lambda s: s["task"].update(robot_base_pose=[0] * 6), "robot_base_pose is a list; expected 7 numbers"),
     (lambda s: s["task"].update(robot_base_pose=[float("nan")] * 7), "robot_base_pose is nan; expected a number between"), (lambda s: s["task"].pop("pickup_obj_name"), "pickup_obj_name is null"),
     (lambda s: s["task"].update(succ_pos_threshold="high"), "succ_pos_threshold is a text"), (lambda s: s["task"].update(object_colors={"a": [1, 0, 0, 1]}), "it has object_colors"),
-    (lambda s: s["robot"].update(init_qpos={"arm": [0] * 101}), "expected at most 100 numbers"), (lambda s: s["robot"].update(init_qpos=[1]), "init_qpos is a list; expected an object"),
+    (lambda s: s["robot"].update(init_qpos={"arm": [0] * 101}), "expected at most 100 numbers"),
+    (lambda s: s["robot"].update(robot_name="/tmp/x/robot.toml"), "robot is '/tmp/x/robot.toml'; a benchmark can only contain names"), (lambda s: s.update(mjsense={"options": {"environment": "../x.exr"}}), "can only contain names"),
+    (lambda s: s.update(mjsense={"options": {"ffmpeg": "sh"}}), "it has the option 'ffmpeg'"), (lambda s: s["robot"].update(init_qpos=[1]), "init_qpos is a list; expected an object"),
     (lambda s: s["cameras"][0].update(name="../x"), r"name is '\.\./x'; expected letters"), (lambda s: s["cameras"].append(s["cameras"][0]), "two cameras have the same name"),
     (lambda s: s["cameras"][0].update(camera_quaternion=[0] * 4), "camera_quaternion is 0"), (lambda s: s["cameras"][0].update(type="hidden"), "type is 'hidden'; expected robot_mounted or exocentric"),
     (lambda s: s["language"].update(task_description="a\x1b[2J"), "expected a text of 1 to 1000 printable characters"), (lambda s: s["scene_modifications"].update(object_poses={"x\n": [0] * 7}), "cannot be a name, which has 1 to 200 printable"),
     (lambda s: s["scene_modifications"].update(object_poses={"x": {}}), "x is an object; expected 7 numbers"), (lambda s: s["scene_modifications"].update(removed_objects="all"), "removed_objects is a text"),
     (lambda s: s.update(cameras=[{}] * 33), "expected a list of at most 32 objects"), (lambda s: s.update(mjsense={"episode": True}), "episode is true or false"),
-], ids=range(22))  # fmt: skip
+], ids=range(25))  # fmt: skip
 def test_a_hostile_file_is_refused(change, message):
     spec = copy.deepcopy(foreign())
     change(spec)

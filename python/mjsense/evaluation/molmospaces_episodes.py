@@ -131,7 +131,7 @@ def read_episode(value: Any, place: str) -> MolmoSpacesEpisode:
         house=spec.whole("house_index"),
         seed=spec.whole("seed", 0, 1 << 64) if spec.table.get("seed") is not None else 0,
         task=name,
-        robot=_robot_of(robot.text("robot_name", _NAME), groups),
+        robot=_robot_of(robot, groups, name),
         size=(int(size[0]), int(size[1])),
         cameras={camera.pop("name"): camera for camera in cameras},
         start=start,
@@ -163,7 +163,10 @@ def _task_of(task: _Reader) -> str:
     return found
 
 
-def _robot_of(name: str, groups: dict[str, Any]) -> str:
+def _robot_of(robot: _Reader, groups: dict[str, Any], task: str) -> str:
+    """The name here. It cannot be a file: a robot may be given by the path of one."""
+    name = robot.text("robot_name", _NAME)
+    checked_recipe({"robot": name, "task": task}, Path(robot.place))
     if name == "i2rt_yam" and any(group.startswith("left") for group in groups):
         return "bimanual_yam"
     return next((mine for mine, theirs in ROBOTS.items() if theirs == name), {"rby1m": "rby1"}.get(name, name))
