@@ -209,23 +209,11 @@ def test_sensor_tests_of_mjlab(environment, tmp_path):
     folder = checkout("mjlab/tests/test_foot_height_sensor.py").parent
     for name in ("conftest", *(f"test_{name}" for name in names)):
         text = (folder / f"{name}.py").read_text()
-        (tmp_path / f"{name}.py").write_text(
-            re.sub(r"\b(from|import) mjlab\b(?!\.envs|\.tasks)", r"\1 mjsense.compat.mjlab", text)
-        )
+        (tmp_path / f"{name}.py").write_text(re.sub(r"\b(from|import) mjlab\b(?!\.envs|\.tasks)", r"\1 mjsense.compat.mjlab", text))
     (tmp_path / "fixtures").symlink_to(folder / "fixtures")
     report = tmp_path / "report.xml"
     path = Path(mjsense.__file__).parents[1]
-    words = [
-        environment("mjlab"),
-        "-m",
-        "pytest",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "--tb=short",
-        f"--junit-xml={report}",
-        tmp_path,
-    ]
+    words = [environment("mjlab"), "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=short", f"--junit-xml={report}", tmp_path]
     done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(path)})
     cases = [*ElementTree.parse(report).iter("testcase")]
     failed = {case.get("name") for case in cases if case.find("failure") is not None or case.find("error") is not None}
