@@ -75,6 +75,7 @@ set(MJSENSE_PUBLIC_HEADERS
   mjsense_tasks/cameras/frozen_cameras.h
   mjsense_tasks/cameras/load_cameras.h
   mjsense_tasks/episode/active_worlds.h
+  mjsense_tasks/episode/given_start.h
   mjsense_tasks/episode/object_sensors.h
   mjsense_tasks/episode/object_shape.h
   mjsense_tasks/episode/perturbation.h

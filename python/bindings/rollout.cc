@@ -446,6 +446,15 @@ void bind_rollout(nb::module_& m) {
           "obs_scene", [](PyRollout& s, int w) { return s.rollout().obs_scene(w); },
           nb::arg("world"))
       .def(
+          "start_text",
+          [](PyRollout& s, int w) {
+            std::string text;
+            s.read([&](tasks::rollout::Rollout& rollout) { text = rollout.start_text(w); });
+            return text;
+          },
+          nb::arg("world"),
+          "The start of the world's episode, at its first observation, as JSON text.")
+      .def(
           "instruction", [](PyRollout& s, int w) { return s.rollout().task().instruction(w); },
           nb::arg("world"))
       .def(

@@ -10,6 +10,7 @@
 #include "mjsense_tasks/cameras/frozen_cameras.h"
 #include "mjsense_tasks/cameras/load_cameras.h"
 #include "mjsense_tasks/episode/active_worlds.h"
+#include "mjsense_tasks/episode/given_start.h"
 #include "mjsense_tasks/episode/object_sensors.h"
 #include "mjsense_tasks/episode/object_shape.h"
 #include "mjsense_tasks/episode/perturbation.h"

@@ -17,6 +17,7 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 import mjsense
@@ -231,6 +232,24 @@ def test_sensor_tests_of_mjlab(environment, tmp_path):
 def test_molmospaces(environment, script, tmp_path, monkeypatch):
     monkeypatch.setenv("MLSPACES_ASSETS_DIR", str(tmp_path))
     run(environment("molmospaces"), Path(__file__).parent / f"adapters/{script}.py", ROOT / "docs/drop_in/molmospaces.md")
+
+
+def test_benchmarks_of_molmospaces(environment, tmp_path):
+    """Their schema reads what mjsense exports, and what it writes starts in the same states."""
+    pytest.importorskip("pyarrow")
+    small = {"episodes": 2, "horizon": 3, "width": 32, "height": 24, "camera_system": "droid", "progress": False}
+    tasks = ("pick", "pick_and_place", "open")
+    for task in tasks:
+        benchmark = mjsense.evaluation.create_benchmark(task, out=tmp_path / f"{task}_bench", **small)
+        mjsense.evaluation.export_molmospaces(benchmark, tmp_path / task)
+    script = Path(__file__).parent / "adapters/molmospaces_benchmark.py"
+    run(environment("molmospaces"), script, *(tmp_path / task for task in tasks))
+    for task in tasks:
+        mjsense.evaluate(tmp_path / f"{task}_again", policy="random", out=tmp_path / f"{task}_out", progress=False)
+        starts = mjsense.Dataset(tmp_path / f"{task}_bench/starts").episodes
+        for one, other in zip(starts, mjsense.Dataset(tmp_path / f"{task}_out").episodes, strict=True):
+            np.testing.assert_allclose(other.states[0], one.states[0], atol=1e-12)
+            assert other.task == one.task
 
 
 def test_gym_hil(environment):

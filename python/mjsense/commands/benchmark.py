@@ -13,6 +13,7 @@ EXAMPLES = [
         "Fix 200 episodes of the task pick, so that other users can play the same.",
     ),
     ("mjsense benchmark check bench", "Check that the episodes of a benchmark start as when it was made."),
+    ("mjsense benchmark export benchmark:pick --out theirs", "Write a benchmark as MolmoSpaces' benchmark.json."),
 ]
 _NOT_FIXED = (
     "policy",
@@ -45,9 +46,12 @@ _NOT_FIXED = (
 
 def add_arguments(parser: Parser) -> None:
     parser.add_argument(
-        "action", choices=("create", "check"), help="create: write a benchmark. check: compare its starts with the stored ones."
+        "action",
+        choices=("create", "check", "export"),
+        help="create: write a benchmark. check: compare its starts with the stored ones. export: write it as MolmoSpaces' "
+        "benchmark.json.",
     )
-    add_name(parser, "task", "tasks", "create: name of the task. check: a benchmark.", metavar="TASK")
+    add_name(parser, "task", "tasks", "create: name of the task. check and export: a benchmark.", metavar="TASK")
     parser.add_argument(
         "--no-terminate-upon-success",
         dest="terminate_upon_success",
@@ -65,9 +69,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     options = field_values(arguments, "RecordJobCfg")
     del options["task"]  # an argument
+    allowed = {"create": set(options), "export": {"out"}}.get(arguments.action, set())
+    if given := options.keys() - allowed:
+        raise ValueError(f"benchmark {arguments.action}: --{min(given).replace('_', '-')} is an option of create")
     if arguments.action == "check":
-        if options:
-            raise ValueError(f"benchmark check: --{min(options).replace('_', '-')} is an option of create")
         found = Benchmark(arguments.task)
         found.check_starts()
         if not arguments.quiet:
@@ -75,6 +80,13 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     if not options.get("out"):
         raise ValueError("benchmark: the output directory is missing: pass --out DIR")
+    if arguments.action == "export":
+        from mjsense.evaluation.molmospaces_export import export_molmospaces
+
+        count = export_molmospaces(arguments.task, options["out"])
+        if not arguments.quiet:
+            print(f"{count} episodes in {options['out']}/benchmark.json")
+        return 0
     found = create_benchmark(arguments.task, progress=False if arguments.quiet else None, **options)
     if not arguments.quiet:
         print(f"{len(found.episodes)} episodes of {found.name} in {found.folder}, {found.checksum}")

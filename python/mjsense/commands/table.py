@@ -53,6 +53,7 @@ FIELDS = {
         Field('instructions', 'instructions', 'instructions', 'text', 'Instruction of each episode. varied: paraphrases that describe the objects by what distinguishes them in that episode; canonical: one sentence per task and object.', words=['varied', 'canonical'], default='varied'),
         Field('terminate_upon_success', 'terminate_upon_success', 'terminate_upon_success', 'bool', 'End an episode at its first success.'),
         Field('max_penetration', 'max_penetration', 'max_penetration', 'number', 'Depth of a contact. After an observation with a deeper one, the episode is not a success; 0: any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of geoms that are deeper at the start do not count. [m]', low=0.0),
+        Field('starts', 'starts', 'starts', 'text', 'Starts of episodes that replace the sampled ones: JSON text, an object by number of the episode.', hidden=True),
         Field('use_sensors', 'use_sensors', 'use_sensors', 'bool', 'Add the sensors of the task, of the robot and of the policy. False: only the sensors that are passed in.', is_on=True, hidden=True),
         Field('out', 'out', 'out', 'path', 'Output directory.'),
         Field('episodes', 'episodes', 'episodes', 'int', 'Number of episodes to keep.', default='1', low=1.0),
@@ -123,6 +124,7 @@ FIELDS = {
         Field('instructions', 'instructions', 'instructions', 'text', 'Instruction of each episode. varied: paraphrases that describe the objects by what distinguishes them in that episode; canonical: one sentence per task and object.', words=['varied', 'canonical'], default='varied'),
         Field('terminate_upon_success', 'terminate_upon_success', 'terminate_upon_success', 'bool', 'End an episode at its first success.'),
         Field('max_penetration', 'max_penetration', 'max_penetration', 'number', 'Depth of a contact. After an observation with a deeper one, the episode is not a success; 0: any depth. By default 4 mm in built-in tasks, and any depth in user-defined ones. Pairs of geoms that are deeper at the start do not count. [m]', low=0.0),
+        Field('starts', 'starts', 'starts', 'text', 'Starts of episodes that replace the sampled ones: JSON text, an object by number of the episode.', hidden=True),
         Field('use_sensors', 'use_sensors', 'use_sensors', 'bool', 'Add the sensors of the task, of the robot and of the policy. False: only the sensors that are passed in.', is_on=True, hidden=True),
     ],
     "RenderCfg": [

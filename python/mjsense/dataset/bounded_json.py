@@ -9,7 +9,7 @@ from typing import Any
 from mjsense.dataset.limits import JSON_DEPTH, JSON_VALUES
 
 
-def parse(text: str | bytes, what: str, max_bytes: int) -> Any:
+def parse(text: str | bytes, what: str, max_bytes: int, max_values: int = JSON_VALUES) -> Any:
     """The value of a JSON text.
 
     Args:
@@ -23,7 +23,7 @@ def parse(text: str | bytes, what: str, max_bytes: int) -> Any:
         raise ValueError(f"{what} is nested deeper than {JSON_DEPTH} levels") from None
     except ValueError as error:  # also of invalid UTF-8 and numbers of too many digits
         raise ValueError(f"{what} is not JSON text: {error}") from None
-    _check_size(value, what)
+    _check_size(value, what, max_values)
     return value
 
 
@@ -58,7 +58,7 @@ def kind_of(value: Any) -> str:
     return kinds.get(type(value), type(value).__name__)
 
 
-def _check_size(value: Any, what: str) -> None:
+def _check_size(value: Any, what: str, max_values: int) -> None:
     count, level = 0, [value]
     for depth in range(JSON_DEPTH + 2):
         inner: list[Any] = []
@@ -68,8 +68,8 @@ def _check_size(value: Any, what: str) -> None:
             elif isinstance(one, list):
                 inner += one
         count += len(inner)
-        if count > JSON_VALUES:
-            raise ValueError(f"{what} has more than {JSON_VALUES} values")
+        if count > max_values:
+            raise ValueError(f"{what} has more than {max_values} values")
         if not inner:
             return
         if depth > JSON_DEPTH:

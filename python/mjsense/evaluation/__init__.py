@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from mjsense.evaluation.benchmarks import create_benchmark as create_benchmark
     from mjsense.evaluation.comparison import Comparison as Comparison
     from mjsense.evaluation.comparison import compare as compare
+    from mjsense.evaluation.molmospaces_export import export_molmospaces as export_molmospaces
     from mjsense.evaluation.playing import evaluate as evaluate
     from mjsense.evaluation.policies import policy_from as policy_from
     from mjsense.evaluation.protocol import BatchedPolicy as BatchedPolicy
@@ -36,6 +37,7 @@ _PLACES: dict[str, str] = {
     "compare": "comparison",
     "create_benchmark": "benchmarks",
     "evaluate": "playing",
+    "export_molmospaces": "molmospaces_export",
     "policy_from": "policies",
     "results": "report",
     "sensitivity": "varied",
@@ -54,6 +56,7 @@ __all__ = [
     "compare",
     "create_benchmark",
     "evaluate",
+    "export_molmospaces",
     "policy_from",
     "results",
     "sensitivity",

@@ -15,14 +15,14 @@ import inspect
 import json
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mjsense import _core
-from mjsense.core.errors import UnknownNameError, did_you_mean, printable
+from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.dataset import Dataset, Episode, bounded_json
 from mjsense.dataset.places import is_plain_name
 from mjsense.tasks.recording import record
@@ -31,7 +31,6 @@ from mjsense.tasks.vector import TaskVectorEnv, make_vec
 FILE, STARTS = "benchmark.json", "starts"
 PREFIX, _SHIPPED = "benchmark:", Path(__file__).parent / "shipped"
 _FORMAT = 1
-_SHOWN = 10  # houses in a message
 _FILE_BYTES = 1 << 24
 _MAX_EPISODES, _MAX_FILES, _MAX_DEPTH = 100_000, 1_000_000, 4
 _PARTS = ("task", "robot", "scene", "split", "arm_controller", "camera_system")
@@ -47,6 +46,8 @@ _COLOURS = (
     "ambient_occlusion",
 )
 _PLAY = ("seed", "horizon", "policy_dt_ms", "perturb", "instructions", "terminate_upon_success", "max_penetration")
+IMAGE_OPTIONS = tuple(name for name in (*_IMAGES, *_COLOURS) if name not in ("cameras", "width", "height", "depth"))
+"""Options of the images, without their number and size."""
 RECIPE = (*_PARTS, *_IMAGES, *_COLOURS, *_PLAY)
 """Options of a recording that a benchmark fixes."""
 _NAME = re.compile(r"([A-Za-z0-9_+-]{1,100}(@[a-z]{1,20})?(:[0-9]{1,9})?)?")
@@ -79,8 +80,6 @@ class Benchmark:
         with open(path, "rb") as file:
             text = file.read(_FILE_BYTES + 1)
         table = bounded_json.parse(text, str(path), _FILE_BYTES)
-        if isinstance(table, list):
-            raise ValueError(f"{path} is a benchmark of MolmoSpaces, {_houses_of(table)}. mjsense does not contain these scenes")
         if not isinstance(table, dict):
             raise ValueError(f"{path} is {bounded_json.kind_of(table)}, not an object")
         if table.get("format") != _FORMAT:
@@ -89,7 +88,7 @@ class Benchmark:
         """SHA-256 of everything that the benchmark fixes."""
         if table.get("checksum") != self.checksum:
             raise ValueError(f"{path}: the contents do not have the checksum that is stated: the file was changed")
-        self.recipe: dict[str, Any] = _recipe(table.get("recipe"), path)
+        self.recipe: dict[str, Any] = checked_recipe(table.get("recipe"), path)
         """Options of the recording."""
         self.episodes: list[int] = _numbers(table.get("episodes"), path)
         self.version = str(table.get("version", ""))
@@ -103,7 +102,7 @@ class Benchmark:
     def options(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """The options of a recording of this benchmark. Raises ValueError for given ones that it fixes."""
         options = {name: value for name, value in given.items() if name != "task"}
-        for name, default in {**_DEFAULTS, "house": 0}.items():
+        for name, default in {**DEFAULTS, "house": 0}.items():
             if name in options and options.pop(name) not in (default, self.recipe.get(name, default)):
                 raise ValueError(f"benchmark '{self.folder}': it fixes {name}, which is given too; leave it out")
         return {**options, **self.recipe}
@@ -134,7 +133,7 @@ class Benchmark:
         compare = _difference if self._digests is None else _difference_of_digests
         env = make_vec(**_env_options(self.recipe, min(num_worlds, len(self.episodes))))
         try:
-            for world, number in _started(env, self.episodes):
+            for world, number in started(env, self.episodes):
                 if difference := compare(env, world, stored[number]):
                     raise ValueError(
                         f"benchmark '{self.folder}': episode {number} does not start as when the benchmark was "
@@ -145,24 +144,7 @@ class Benchmark:
             env.close()
 
 
-def _houses_of(episodes: list[Any]) -> str:
-    """The scenes of MolmoSpaces' episodes: ``3 episodes in the houses 1, 5 of procthor-10k (val)``."""
-    houses: dict[str, set[int]] = {}
-    for episode in episodes:
-        about = episode if isinstance(episode, dict) else {}
-        name, split, house = about.get("scene_dataset"), about.get("data_split", "val"), about.get("house_index")
-        if isinstance(name, str) and isinstance(split, str) and type(house) is int:
-            houses.setdefault(printable(f"{name:.60} ({split:.20})"), set()).add(house)
-    texts = [f"{_first(map(str, sorted(numbers)), ', ')} of {name}" for name, numbers in sorted(houses.items())]
-    return f"{len(episodes)} episodes in the houses {_first(texts, '; ') or 'that it does not state'}"
-
-
-def _first(texts: Iterable[str], comma: str) -> str:
-    listed = list(texts)
-    return comma.join([*listed[:_SHOWN], *["..."] * (len(listed) > _SHOWN)])
-
-
-_DEFAULTS: dict[str, Any] = {
+DEFAULTS: dict[str, Any] = {
     name: parameter.default for name, parameter in inspect.signature(record).parameters.items() if name in RECIPE
 } | {"terminate_upon_success": True}  # as evaluate()
 """Options that a caller did not choose."""
@@ -194,7 +176,7 @@ def create_benchmark(
             raise ValueError(f"benchmark: it cannot fix '{name}'{did_you_mean(name, RECIPE, 'it can fix')}")
     if not 1 <= episodes <= _MAX_EPISODES:
         raise ValueError(f"benchmark: episodes is {episodes}: must be between 1 and {_MAX_EPISODES}")
-    recipe = _recipe({**_DEFAULTS, **options, "task": task}, folder)
+    recipe = checked_recipe({**DEFAULTS, **options, "task": task}, folder)
     parts = {name: recipe[name] for name in ("task", "robot", "scene", "split") if recipe[name] is not None}
     _, robot, scene, _, _ = _core.resolved_job({**parts, "out": "."})
     recipe |= {"robot": robot or None, "scene": scene, "split": ""}
@@ -224,7 +206,7 @@ def create_benchmark(
     table = {
         "format": _FORMAT,
         "version": _core.__version__,  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
-        "recipe": _recipe(recipe, folder),
+        "recipe": checked_recipe(recipe, folder),
         "episodes": sorted(episode.number for episode in stored),
         "files": dict(_checksums(part / STARTS)),
     }
@@ -253,7 +235,7 @@ def digests_of(benchmark: Benchmark, num_worlds: int = 4) -> dict[str, Any]:
     """Contents of ``benchmark.json`` with checksums of the starts instead of their recording."""
     env = make_vec(**_env_options(benchmark.recipe, num_worlds))
     try:
-        digests = {str(number): _digests(env, world) for world, number in _started(env, benchmark.episodes)}
+        digests = {str(number): _digests(env, world) for world, number in started(env, benchmark.episodes)}
     finally:
         env.close()
     table = {
@@ -285,7 +267,7 @@ def _difference_of_digests(env: TaskVectorEnv, world: int, stored: Any) -> str:
     )
 
 
-def _started(env: TaskVectorEnv, numbers: list[int]) -> Iterator[tuple[int, int]]:
+def started(env: TaskVectorEnv, numbers: list[int]) -> Iterator[tuple[int, int]]:
     """(world, number) of each episode while it is at its start."""
     for first in range(0, len(numbers), env.num_envs):
         some = numbers[first : first + env.num_envs]
@@ -319,7 +301,7 @@ def arrays_of(model: Any) -> Iterator[tuple[str, np.ndarray]]:
             yield name, value
 
 
-def _recipe(recipe: Any, path: Path) -> dict[str, Any]:
+def checked_recipe(recipe: Any, path: Path) -> dict[str, Any]:
     """The options of a recipe, checked: known options whose texts are names, not files or code."""
     if not isinstance(recipe, dict):
         raise ValueError(f"{path}: the recipe is {bounded_json.kind_of(recipe)}; expected an object")

@@ -52,6 +52,9 @@ def facts_of(dataset: Dataset, rows: list[Row]) -> list[tuple[str, str]]:
         ("task", _values(settings, "task")),
         ("robot", _values(settings, "robot")),
         ("scene", _values(settings, "scene")),
+        ("seed", _values(settings, "seed")),
+        ("horizon [steps]", _values(settings, "horizon")),
+        ("duration of an action [ms]", _values(settings, "policy_dt_ms")),
         ("benchmark", _joined(benchmark.get("name"), benchmark.get("checksum"))),
         ("data", _joined(data.get("path"), data.get("fingerprint"))),
         ("execution of actions", evaluation.get("settings")),
@@ -81,7 +84,9 @@ def fingerprint(settings: list[dict[str, Any]], rows: list[Row]) -> str:
 
 
 def _values(settings: list[dict[str, Any]], name: str) -> str:
-    return ", ".join(dict.fromkeys(str(one[name]) for one in settings if isinstance(one.get(name), str) and one[name]))
+    """The different values of a setting; those that are neither texts nor whole numbers are left out."""
+    values = [one.get(name) for one in settings]
+    return ", ".join(dict.fromkeys(str(value) for value in values if value != "" and type(value) in (str, int)))
 
 
 def _joined(*parts: Any) -> str:

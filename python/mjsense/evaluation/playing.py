@@ -15,6 +15,7 @@ from mjsense import _core
 from mjsense.core.arguments import Seed, checked
 from mjsense.evaluation.benchmarks import Benchmark, is_benchmark
 from mjsense.evaluation.facts import FILE
+from mjsense.evaluation.molmospaces_benchmark import MolmoSpacesBenchmark, is_molmospaces
 from mjsense.evaluation.policies import policy_from
 from mjsense.evaluation.replayed import ReplayedPolicy
 from mjsense.evaluation.report import Results, require_parquet, results
@@ -22,7 +23,7 @@ from mjsense.evaluation.timing import Latency, timed
 from mjsense.tasks.code_checksums import checksums
 from mjsense.tasks.parts import Robots, Scenes, Tasks
 from mjsense.tasks.policy import Policy
-from mjsense.tasks.record_job import RecordProgress
+from mjsense.tasks.record_job import RecordProgress, record_here
 from mjsense.tasks.recording import record
 from mjsense.tasks.vector import checked_episodes
 
@@ -224,28 +225,31 @@ def play(
     """
     require_parquet()
     out, spec = Path(options["out"]), policy if isinstance(policy, str) else None
-    benchmark = Benchmark(options["task"]) if is_benchmark(options["task"]) else None
-    numbers: int | Sequence[int] = options.pop("episodes", 50)
-    if benchmark is not None:
-        options, numbers = benchmark.options(options), benchmark.episodes
+    benchmark = _benchmark_of(options)
     made = policy_from(policy, **(policy_options or {}))
     noise = False
+    jobs = _jobs(benchmark, options, ray)
+    numbers = [number for job, played in jobs for number in (range(played) if isinstance(played, int) else played)]
     if isinstance(made, ReplayedPolicy):
-        made.check(_settings(options), range(numbers) if isinstance(numbers, int) else numbers)
+        if len(jobs) > 1:
+            raise ValueError(f"replay: '{options['task']}' has episodes of {len(jobs)} kinds, and a recording is of one kind")
+        made.check(_settings(jobs[0][0]), numbers)
         noise = bool(made.settings.get("action_noise", False))
     made, timing = timed(made, execution_horizon, ensemble, latency)
-    if benchmark is not None:
+    if isinstance(benchmark, Benchmark):
         benchmark.check_starts(int(options.get("num_worlds", 4)))
     about = {
         "policy": {"spec": spec, "name": made if isinstance(made, str) else made._mjs_name(), "fingerprint": fingerprint(made)},
         "benchmark": None if benchmark is None else {"name": benchmark.name, "checksum": benchmark.checksum},
         "settings": timing,
-        "episodes": numbers if isinstance(numbers, int) else list(numbers),
+        "episodes": jobs[0][1] if len(jobs) == 1 and isinstance(jobs[0][1], int) else numbers,
     }
     begun = time.perf_counter()
-    options |= {"policy": made, "action_noise": noise, "keep_failures": True, **_attempts(numbers, ray)}
+    not_played: dict[str, int] = {}
     try:
-        record(**options, sensors=sensors, ray=ray, progress=progress)
+        for job, _ in jobs:
+            job |= {"policy": made, "action_noise": noise, "keep_failures": True}
+            not_played |= _record(job, sensors, ray, progress)
     except Exception as error:
         if any(out.glob("house_*/*")):
             error.add_note(f"The finished episodes are in '{out}'; resume the evaluation to play the others.")
@@ -253,7 +257,54 @@ def play(
     _write(out, {**about, "wall_s": round(time.perf_counter() - begun, 3)})
     found = results(out)
     found.write(out)
+    if isinstance(benchmark, MolmoSpacesBenchmark) and len(found.rows) < len(numbers):
+        ended = {row.failure for row in found.rows}
+        played = {reason for reason in not_played if reason.partition(" (")[0] in ended}
+        reasons = "; ".join(f"{count}: {reason}" for reason, count in not_played.items() if reason not in played)
+        raise ValueError(
+            f"benchmark '{benchmark.folder}': {len(numbers) - len(found.rows)} of {len(numbers)} episodes cannot be played"
+            f"{f': {reasons}' if reasons else ''}; the results of the others are in '{out}'"
+        )
     return found
+
+
+def _benchmark_of(options: Mapping[str, Any]) -> Benchmark | MolmoSpacesBenchmark | None:
+    task = options["task"]
+    if not is_benchmark(task):
+        return None
+    if not is_molmospaces(task):
+        return Benchmark(task)
+    scene = options.get("scene") or ""
+    if not isinstance(scene, (str, Path)):
+        raise ValueError("evaluate: the scene of a benchmark of MolmoSpaces must be a name or a file")
+    return MolmoSpacesBenchmark(task, str(scene))
+
+
+def _jobs(
+    benchmark: Benchmark | MolmoSpacesBenchmark | None, options: Mapping[str, Any], ray: str | None
+) -> list[tuple[dict[str, Any], int | list[int]]]:
+    """Options of each recording, and the numbers of its episodes."""
+    options = dict(options)
+    given: int | Sequence[int] = options.pop("episodes", 50)
+    if isinstance(benchmark, MolmoSpacesBenchmark):
+        if ray is not None:
+            raise ValueError("evaluate: a benchmark of MolmoSpaces cannot be played with ray")
+        jobs = benchmark.jobs(options)
+        for job in jobs:
+            if job.get("resume") and not (Path(job["out"]) / f"house_{job['house']}").exists():
+                del job["resume"]  # it was not begun
+        return [(job, job["attempts"]) for job in jobs]
+    if benchmark is not None:
+        options, given = benchmark.options(options), benchmark.episodes
+    return [({**options, **_attempts(given, ray)}, given if isinstance(given, int) else list(given))]
+
+
+def _record(job: dict[str, Any], sensors: Iterable[Any], ray: str | None, progress: Any) -> dict[str, int]:
+    """Records, and returns the reasons of failures."""
+    if "starts" in job:
+        return record_here(job, sensors, progress).failures
+    record(**job, sensors=sensors, ray=ray, progress=progress)
+    return {}
 
 
 def _attempts(numbers: int | Sequence[int], ray: str | None) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from mjsense import _core
 from mjsense.core.errors import did_you_mean, printable
 from mjsense.evaluation.benchmarks import Benchmark, arrays_of, is_benchmark
 from mjsense.evaluation.comparison import Comparison
+from mjsense.evaluation.molmospaces_benchmark import is_molmospaces
 from mjsense.evaluation.playing import play
 from mjsense.evaluation.report import Results
 from mjsense.evaluation.rows import group_of, key_of
@@ -106,6 +107,8 @@ def sensitivity(vary: Iterable[str], **options: Any) -> Sensitivity:
 def play_varied(options: dict[str, Any], policy: Any, vary: list[str], **arguments: Any) -> Sensitivity:
     """See :func:`sensitivity`; the other arguments are those of :func:`mjsense.evaluation.playing.play`."""
     out = Path(options["out"])
+    if is_benchmark(options["task"]) and is_molmospaces(options["task"]):
+        raise ValueError(f"vary: '{options['task']}' is a benchmark of MolmoSpaces, whose episodes fix what would vary")
     benchmark = Benchmark(options["task"]) if is_benchmark(options["task"]) else None
     if benchmark is not None:
         benchmark.check_starts(int(options.get("num_worlds", 4)))

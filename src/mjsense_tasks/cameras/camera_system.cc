@@ -10,6 +10,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/model_geometry.h"
+#include "mjsense/core/named.h"
 #include "mjsense/observe/frame.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense_tasks/cameras/visibility.h"
@@ -32,6 +33,22 @@ Vec3 around(Rng& rng, const std::array<double, 3>& half) {
 Quat turned(Vec3 degrees) {
   return axis_angle({0, 0, 1}, kRad * degrees.z) * axis_angle({0, 1, 0}, kRad * degrees.y) *
          axis_angle({1, 0, 0}, kRad * degrees.x);
+}
+
+// Pose of a mount before its first episode, in the frame of its body.
+Pose pose_of(const CameraMountCfg& c) {
+  switch (c.mount) {
+    case MountKind::kMjcf:
+      break;
+    case MountKind::kBody:
+      return {vec(c.pos), normalized(quat(c.quat.data()))};
+    case MountKind::kLookAt:
+    case MountKind::kFixed:
+      return look_at(vec(c.pos), vec(c.target), vec(c.up));
+    case MountKind::kOrbit:
+      return look_at({c.distance_range[1], 0, c.height_range[1]}, vec(c.target), {0, 0, 1});
+  }
+  return {};
 }
 
 nlohmann::ordered_json list(Vec3 v) { return {v.x, v.y, v.z}; }
@@ -67,20 +84,7 @@ CameraSystem::CameraSystem(CameraSystemCfg cfg, const std::string& prefix, const
     m.fovy = c.fovy.value_or(kDefaultFovy);
     if (c.mount == MountKind::kBody || c.mount == MountKind::kLookAt)
       m.body = prefix + (c.body.empty() ? base : c.body);
-    switch (c.mount) {
-      case MountKind::kMjcf:
-        break;
-      case MountKind::kBody:
-        m.pose = {vec(c.pos), normalized(quat(c.quat.data()))};
-        break;
-      case MountKind::kLookAt:
-      case MountKind::kFixed:
-        m.pose = look_at(vec(c.pos), vec(c.target), vec(c.up));
-        break;
-      case MountKind::kOrbit:  // pose before the first episode
-        m.pose = look_at({c.distance_range[1], 0, c.height_range[1]}, vec(c.target), {0, 0, 1});
-        break;
-    }
+    m.pose = pose_of(c);
     mounted_.push_back(m);
     varies_ = varies_ || c.varies();
   }
@@ -217,14 +221,32 @@ std::string CameraSystem::place_cameras(const World& world, std::uint64_t seed,
       lens = with_noise(camera, rng);
       why = make_visible(camera, world, rng, centre, objects, lens);
     }
-    const std::size_t at = static_cast<std::size_t>(world.id) * world.model->ncam + ids_[i];
-    write_vec(lens.pose.p, pos_ + 3 * at);
-    write_quat(lens.pose.q, quat_ + 4 * at);
-    fovy_[at] = lens.fovy;
-    now_[world.id * ids_.size() + i] = lens;
+    write(world.id, camera, lens);
     if (!why.empty()) return why;
   }
   return "";
+}
+
+void CameraSystem::write(int world, int camera, const Lens& lens) {
+  const std::size_t at =
+      static_cast<std::size_t>(world) * simulation_->model()->ncam + ids_[camera];
+  write_vec(lens.pose.p, pos_ + 3 * at);
+  write_quat(lens.pose.q, quat_ + 4 * at);
+  fovy_[at] = lens.fovy;
+  now_[world * ids_.size() + camera] = lens;
+}
+
+void CameraSystem::set_poses(int world, const CameraSystemCfg& given) {
+  for (const CameraMountCfg& camera : given.cameras) {
+    const CameraMountCfg& own = find_named(cfg_.cameras, &CameraMountCfg::name, camera.name,
+                                           "the episodes' cameras", "camera");
+    if (own.mount != camera.mount || own.body != camera.body)
+      throw ValueError(
+          fmt::format("camera '{}' is mounted on '{}' in one episode and on '{}' in another",
+                      camera.name, own.body, camera.body));
+    write(world, static_cast<int>(&own - cfg_.cameras.data()),
+          {pose_of(camera), camera.fovy.value_or(kDefaultFovy)});
+  }
 }
 
 std::string CameraSystem::frozen(int world) const {

@@ -68,6 +68,11 @@ class CameraSystem {
 
   // Throws KeyError if the model lacks a camera.
   void initialize(sim::Simulation& simulation);
+  // Allows set_poses(), also without cameras that vary. Call it before initialize().
+  void allow_poses() { varies_ = true; }
+  // Writes the poses and fields of view of these cameras, which are mounted on the same bodies as
+  // those of cfg(), to the world's own model. Throws KeyError, ValueError.
+  void set_poses(int world, const CameraSystemCfg& given);
   // True if some camera must be placed at the start of an episode.
   bool varies() const { return varies_; }
 
@@ -89,6 +94,7 @@ class CameraSystem {
     double fovy;
   };
   Lens with_noise(int camera, Rng& rng) const;
+  void write(int world, int camera, const Lens& lens);
   // Searches for a lens in the world that shows more than `best`, the share that `out` shows.
   std::string orbit(int camera, const World& world, Rng& rng, Vec3 centre,
                     std::span<const int> objects, double best, Lens& out) const;

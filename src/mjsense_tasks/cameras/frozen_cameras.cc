@@ -31,6 +31,7 @@ CameraMountCfg read_camera(const std::string& name, const Json& camera, std::str
   if (fovy == camera.end() || !fovy->is_number())
     throw ValueError(who + ": 'fovy' must be a number");
   out.fovy = fovy->get<double>();
+  out.depth = camera.contains("depth") && camera["depth"] == true;
   if (!camera.contains("body")) {
     out.mount = MountKind::kFixed;
     const auto forward = numbers<3>(camera, "forward", who);

@@ -82,6 +82,7 @@ void Task::initialize(const mjModel* model, int num_worlds) {
                                              periods);
   }
   episodes_.assign(num_worlds, {});
+  if (!cfg_.starts.empty()) check_names(model, cfg_.starts, fmt::format("task '{}'", name()));
   initialize_task();
 }
 
@@ -98,7 +99,30 @@ void Task::sample(int world, std::int64_t episode, const robots::StateRow& state
           static_cast<std::uint64_t>(episode));
   const std::optional<Pose> base = sample_scene(world, rng, state);
   if (!samples_robot()) robot_->write_joints(state, rng);
-  robot_->stand(state, base);
+  const GivenStart* given = given_start(world);
+  if (given) {
+    write_start(model_, *given, state);
+    for (const auto& [group, positions] : given->robot)
+      robot_->write_group(state, group, positions);
+    adopt(world, *given, state);
+  }
+  robot_->stand(state, given && given->base ? given->base : base);
+}
+
+const GivenStart* Task::given_start(int world) const {
+  const auto found = cfg_.starts.find(episode(world));
+  return found == cfg_.starts.end() ? nullptr : &found->second;
+}
+
+double Task::threshold(int world, std::string_view name, double otherwise) const {
+  const GivenStart* given = given_start(world);
+  if (!given) return otherwise;
+  const auto found = given->thresholds.find(std::string(name));
+  return found == given->thresholds.end() ? otherwise : found->second;
+}
+
+void Task::adopt(int /*world*/, const GivenStart& /*start*/, const robots::StateRow& /*state*/) {
+  throw ValueError(fmt::format("task '{}' cannot play episodes with given starts", name()));
 }
 
 void Task::choose_goal(int /*world*/, Rng& /*rng*/, const robots::StateRow& /*state*/) {
@@ -119,6 +143,8 @@ void Task::begin(const World& world) {
     Rng rng(cfg_.seed, 0, stream("instruction"), static_cast<std::uint64_t>(episode.number));
     episode.paraphrase = paraphrase(world, rng);
   }
+  const GivenStart* given = given_start(world.id);
+  if (given && !given->instruction.empty()) episode.paraphrase = given->instruction;
   robot_->reset(world);
 }
 
@@ -189,7 +215,8 @@ std::string Task::obs_scene(int world) const {
   nlohmann::ordered_json scene;
   scene["task_type"] = type();
   scene["task_description"] = description(world);
-  if (cfg_.instructions == Instructions::kVaried) scene["instruction"] = instruction(world);
+  if (cfg_.instructions == Instructions::kVaried || !now(world).paraphrase.empty())
+    scene["instruction"] = instruction(world);
   scene["policy_dt_ms"] = cfg_.policy_dt_ms;
   if (const std::string name = light(world); !name.empty()) scene["light"] = name;
   auto& expressions = scene["referral_expressions"] = nlohmann::ordered_json::object();

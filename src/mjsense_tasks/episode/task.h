@@ -21,6 +21,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -35,6 +36,7 @@
 #include "mjsense/core/text/json.h"
 #include "mjsense/scene/scene.h"
 #include "mjsense_tasks/episode/active_worlds.h"
+#include "mjsense_tasks/episode/given_start.h"
 #include "mjsense_tasks/episode/perturbation.h"
 #include "mjsense_tasks/robots/robot.h"
 #include "mjsense_tasks/robots/scene_robot.h"
@@ -81,6 +83,7 @@ struct TaskCfg {
   // Share of episodes that are perturbed on purpose (perturbation.h).
   double perturb = 0;
   NamedEnum<Instructions> instructions;
+  GivenStarts starts;  // episodes of other numbers are sampled
 };
 
 // An object with a role in an episode, such as "pickup_obj".
@@ -161,6 +164,12 @@ class Task {
   // does not depend on the world. `draw` > 0 gives another start state, if the ones before cannot
   // be played.
   void sample(int world, std::int64_t episode, const robots::StateRow& state, int draw = 0);
+  // The given start of this world's episode; null: it was sampled.
+  const GivenStart* given_start(int world) const;
+  // The thresholds of success that a given start can replace, by MolmoSpaces' names.
+  virtual std::map<std::string, double> thresholds() const { return {}; }
+  // A threshold of success: that of the given start, or `otherwise`.
+  double threshold(int world, std::string_view name, double otherwise) const;
   // Called after forward(). Stores what the episode is evaluated against (start poses), sets the
   // controllers' targets and resets the step count.
   virtual void begin(const World& world);
@@ -247,6 +256,9 @@ class Task {
   // In a state that another task has sampled: chooses the goal of the episode without moving
   // anything. Throws ValueError if the task does not support it.
   virtual void choose_goal(int world, Rng& rng, const robots::StateRow& state);
+  // In a state with the bodies, joints and robot of a given start: makes its objects those of the
+  // episode, and removes absent ones. Throws ValueError if the task does not support it.
+  virtual void adopt(int world, const GivenStart& start, const robots::StateRow& state);
   // Further members of obs_scene with text values, in this order.
   virtual std::vector<std::pair<std::string, std::string>> scene_info(int world) const {
     (void)world;

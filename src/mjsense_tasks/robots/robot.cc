@@ -229,6 +229,16 @@ void Robot::write_joints(const StateRow& state, Rng& rng) const {
   }
 }
 
+void Robot::write_group(const StateRow& state, std::string_view name,
+                        std::span<const double> positions) const {
+  const MoveGroup& group = this->group(name);
+  if (positions.size() != group.qpos.size())
+    throw ValueError(fmt::format("robot '{}': group '{}' has {} joint positions, not {}", cfg_.name,
+                                 name, group.qpos.size(), positions.size()));
+  for (std::size_t i = 0; i < positions.size(); ++i) state.qpos[group.qpos[i]] = positions[i];
+  for (int dof : group.dofs) state.qvel[dof] = 0;
+}
+
 bool Robot::lower_torso() {
   bool any = false;
   for (MoveGroupCfg& group : cfg_.groups) {

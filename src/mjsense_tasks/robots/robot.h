@@ -78,6 +78,9 @@ class Robot {
   // The two parts of write_start(): the joint positions; and the base placement with the controls.
   void write_joints(const StateRow& state, Rng& rng) const;
   void stand(const StateRow& state, const std::optional<Pose>& base) const;
+  // Writes the joint positions of one group, at rest. Throws KeyError, ValueError.
+  void write_group(const StateRow& state, std::string_view group,
+                   std::span<const double> positions) const;
   // Replaces the start positions of every group that has `low_init` positions by these, for all
   // later starts. Returns whether there is such a group.
   bool lower_torso();

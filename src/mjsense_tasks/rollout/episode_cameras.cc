@@ -8,6 +8,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/named.h"
+#include "mjsense_tasks/cameras/frozen_cameras.h"
 #include "mjsense_tasks/cameras/load_cameras.h"
 #include "mjsense_tasks/rollout/rollout.h"
 
@@ -42,13 +43,20 @@ cameras::CameraSystem choose_cameras(const episode::Task& task, const RolloutCfg
   cameras::CameraSystemCfg system;
   system.width = robot.image_width;
   system.height = robot.image_height;
-  if (!cfg.camera_system.empty()) {
+  const episode::GivenStarts& starts = task.cfg().starts;
+  const bool given = !starts.empty() && !starts.begin()->second.cameras.empty();
+  if (given) {
+    system.cameras =
+        cameras::read_frozen(starts.begin()->second.cameras, robots::Robot::kPrefix, "starts")
+            .cameras;
+  } else if (!cfg.camera_system.empty()) {
     system = cameras::load_camera_system(cfg.camera_system, robot.file, robots::Robot::kPrefix);
   } else {
     for (const robots::CameraMount& mount : robot.cameras)
       system.cameras.push_back(of_model(mount, false));
   }
-  for (const robots::CameraMount& mount : task.cameras())
+  for (const robots::CameraMount& mount :
+       given ? std::vector<robots::CameraMount>() : task.cameras())
     system.cameras.push_back(of_model(mount, true));
 
   if (cfg.cameras) {

@@ -151,7 +151,8 @@ class RecordJob {
 
   static RolloutCfg rollout_cfg(const RecordJobCfg& cfg) {
     RolloutCfg rollout = cfg.rollout;
-    rollout.seed = seed_of_house(rollout.seed, cfg.house);
+    // With given starts, what is not given is that of the stated seed.
+    if (rollout.starts.empty()) rollout.seed = seed_of_house(rollout.seed, cfg.house);
     return rollout;
   }
 

@@ -171,6 +171,11 @@ std::string recording_settings(const RecordJobCfg& job, Rollout& rollout) {
     sum.add(bytes.data(), bytes.size());
     settings["environment_file"] = sum.text();
   }
+  if (!cfg.starts.empty()) {
+    record::Checksum sum;
+    sum.add(cfg.starts.data(), cfg.starts.size());
+    settings["starts"] = sum.text();
+  }
   if (!cfg.code.empty()) settings["code"] = cfg.code;
   return settings.dump();
 }

@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "mjsense/core/error.h"
@@ -63,6 +65,7 @@ episode::TaskCfg task_cfg(const RolloutCfg& cfg) {
   out.perturb = cfg.perturb;
   out.instructions = cfg.instructions;
   out.terminate_upon_success = cfg.terminate_upon_success;
+  if (!cfg.starts.empty()) out.starts = episode::read_starts(cfg.starts);
   if (!cfg.make_task) set_task_defaults(cfg.task, out);
   if (cfg.horizon) out.horizon = *cfg.horizon;
   if (cfg.policy_dt_ms) out.policy_dt_ms = *cfg.policy_dt_ms;
@@ -157,6 +160,7 @@ void Rollout::make() {
                                                                   .seed = cfg_.seed});
   simulation_->measure_cost(true);
   for (RecordedCamera& camera : cameras_) camera.sensor = &scene->sensor(camera.name);
+  if (!task_->cfg().starts.empty()) camera_system_->allow_poses();
   camera_system_->initialize(*simulation_);
   if (view_) view_->initialize(*simulation_);
   task_->bind(simulation_);
@@ -223,6 +227,46 @@ std::string Rollout::obs_scene(int world) const {
   if (cfg_.camera_system.empty() && !camera_system_->varies()) return scene;
   return fmt::format("{},\"cameras\":{}}}", scene.substr(0, scene.rfind('}')),
                      camera_system_->frozen(world));
+}
+
+std::string Rollout::start_text(int world) {
+  nlohmann::ordered_json out;
+  const std::array<int, 1> ids{world};
+  for_each(ids, [&](const World& at) {
+    const mjModel* m = at.model;
+    const robots::Robot& robot = task_->robot();
+    const auto name = [m](int address) { return std::string(m->names + address); };
+    for (int j = 0; j < m->njnt; ++j) {
+      const std::string body = name(m->name_bodyadr[m->jnt_bodyid[j]]);
+      if (body.starts_with(robot.prefix())) continue;
+      const double* q = at.data->qpos + m->jnt_qposadr[j];
+      if (m->jnt_type[j] == mjJNT_FREE && !task_->present(world, m->jnt_bodyid[j])) {
+        out["absent"].push_back(body);
+      } else if (m->jnt_type[j] == mjJNT_FREE) {
+        out["bodies"][body] = std::vector<double>(q, q + 7);
+      } else if (m->jnt_type[j] != mjJNT_BALL) {
+        out["joints"][name(m->name_jntadr[j])] = *q;
+      }
+    }
+    for (const robots::MoveGroup& group : robot.groups()) {
+      if (group.kind == robots::GroupKind::kBase) continue;
+      for (int address : group.qpos) out["robot"][group.name].push_back(at.data->qpos[address]);
+    }
+    if (const int base = robot.base_body(); base > 0) {
+      const double* p = at.data->xpos + 3 * base;
+      const double* q = at.data->xquat + 4 * base;
+      out["base"] = {p[0], p[1], p[2], q[0], q[1], q[2], q[3]};
+    }
+    for (const episode::TaskObject& object : task_->objects(world)) {
+      if (object.body >= 0) out["objects"][object.role] = name(m->name_bodyadr[object.body]);
+    }
+  });
+  for (const auto& [key, value] : task_->thresholds())
+    out["thresholds"][key] = task_->threshold(world, key, value);
+  out["instruction"] = task_->instruction(world);
+  if (!cameras_.empty())
+    out["cameras"] = nlohmann::ordered_json::parse(camera_system_->frozen(world));
+  return out.dump();
 }
 
 }  // namespace mjsense::tasks::rollout

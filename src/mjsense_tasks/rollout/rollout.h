@@ -81,6 +81,8 @@ struct RolloutCfg : sensors::ImageCfg {
   std::optional<double> max_penetration;
   double perturb = 0;
   NamedEnum<episode::Instructions> instructions;
+  // Starts of episodes that replace the sampled ones, as JSON text (episode/given_start.h).
+  std::string starts;
   bool use_sensors = true;
   // User-defined factories, used instead of a named task, policy or scene. `task`, `policy` and
   // `scene` above are then only display names.
@@ -177,6 +179,10 @@ void visit_fields(V& v, RolloutCfg& c) {
       .unit("m")
       .at_least(0)
       .decides_data_as("max_penetration");
+  v("starts", c.starts,
+    "Starts of episodes that replace the sampled ones: JSON text, an object by number of the "
+    "episode.")
+      .hidden();
   v("use_sensors", c.use_sensors,
     "Add the sensors of the task, of the robot and of the policy. False: only the sensors that are "
     "passed in.")
@@ -223,6 +229,8 @@ class Rollout {
   // Description of this world's episode for a recording, JSON text: that of the task, and the
   // camera poses if a named camera system is used.
   std::string obs_scene(int world) const;
+  // The start of this world's episode, at its first observation, as RolloutCfg::starts describes it.
+  std::string start_text(int world);
 
   // Stops all worlds. Episodes that start afterwards use this seed.
   void reseed(std::uint64_t seed);

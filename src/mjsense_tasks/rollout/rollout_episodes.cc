@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
+#include "mjsense_tasks/cameras/frozen_cameras.h"
 #include "mjsense_tasks/policies/planner/start_reach.h"
 #include "mjsense_tasks/rollout/action_sensors.h"
 #include "mjsense_tasks/rollout/episode_cameras.h"
@@ -131,10 +132,14 @@ void Rollout::sample(std::span<const int> worlds, std::span<const std::int64_t> 
     take_failures();
     for_each(left, [&](const World& world) {
       why[world.id] = task_->start_error(world);
+      if (task_->given_start(world.id)) return;
       if (why[world.id].empty() && reach_ && draw < kReachDraws && !(*reach_)(world))
         why[world.id] = "the robot does not reach the target";
     });
-    std::erase_if(left, [&](int w) { return why[w].empty() || !faults_[w].empty(); });
+    std::erase_if(left, [&](int w) {
+      if (!why[w].empty() && task_->given_start(w)) set_fault(w, why[w]);
+      return why[w].empty() || !faults_[w].empty();
+    });
   }
   for (int w : left) set_fault(w, std::move(why[w]));
 }
@@ -164,6 +169,10 @@ void Rollout::place_cameras(std::span<const int> worlds) {
     view_->place_cameras(world, cfg_.seed, number, robot.base_pose(world).p, parts);
   });
   for (int w : worlds) {
+    const episode::GivenStart* given = task_->given_start(w);
+    if (given && !given->cameras.empty())
+      camera_system_->set_poses(
+          w, cameras::read_frozen(given->cameras, robots::Robot::kPrefix, "starts"));
     if (!why[w].empty()) set_fault(w, std::move(why[w]));
   }
   simulation_->worlds().model_changed();

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "mjsense/scene/scene.h"
+#include "mjsense_tasks/episode/given_start.h"
 #include "mjsense_tasks/episode/object_shape.h"
 #include "mjsense_tasks/robots/robot.h"
 #include "mjsense_tasks/robots/state_row.h"
@@ -93,6 +94,10 @@ class EpisodeScene {
   // and their sizes. Returns their indices.
   std::vector<int> adopt(int world, std::uint64_t seed, std::uint64_t episode,
                          const robots::StateRow& state);
+  // The same for a given start. Its absent objects are moved away, and so are objects without a pose
+  // in it, if the scene places its objects.
+  void adopt(int world, std::uint64_t seed, std::uint64_t episode, const episode::GivenStart& start,
+             const robots::StateRow& state);
   // Draws one of these objects uniformly. If no hand of the robot can grasp it at its size in this
   // world's episode, another one is drawn, as long as there is one.
   int draw(int world, std::span<const int> of, const robots::Robot& robot, Rng& rng) const;

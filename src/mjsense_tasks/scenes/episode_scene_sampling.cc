@@ -105,6 +105,26 @@ std::vector<int> EpisodeScene::adopt(int world, std::uint64_t seed, std::uint64_
   return here;
 }
 
+void EpisodeScene::adopt(int world, std::uint64_t seed, std::uint64_t episode,
+                         const episode::GivenStart& start, const robots::StateRow& state) {
+  std::vector<char> has_pose(model_->nbody), is_absent(model_->nbody);
+  for (const auto& [name, at] : start.bodies)
+    has_pose[episode::find_name(model_, mjOBJ_BODY, name)] = 1;
+  for (const std::string& name : start.absent) {
+    const int body = episode::find_name(model_, mjOBJ_BODY, name);
+    if (body >= 0) is_absent[body] = 1;
+  }
+  std::vector<int> absent;
+  for (std::size_t i = 0; i < objects_.size(); ++i) {
+    const int body = objects_[i].body;
+    if (!is_absent[body] && (has_pose[body] || regions_.empty())) continue;
+    put(static_cast<int>(i), away(static_cast<int>(i)), state);
+    absent.push_back(model_->body_jntadr[body]);
+  }
+  if (simulation_) simulation_->worlds().hold(world, absent);
+  adopt(world, seed, episode, state);
+}
+
 bool EpisodeScene::counts_objects() const {
   return cfg_.count[0] > 0 && !objects_.empty() && !regions_.empty();
 }

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "mjsense/sim/simulation.h"
 #include "mjsense_tasks/scenes/load_scene.h"
 #include "mjsense_tasks/scenes/robot_floor.h"
@@ -41,6 +43,30 @@ mjModel SceneTask::world_model(int world) const {
 
 std::vector<int> SceneTask::adopt_scene(int world, const robots::StateRow& state) {
   return scene_.adopt(world, cfg().seed, static_cast<std::uint64_t>(episode(world)), state);
+}
+
+int SceneTask::body_of(const episode::GivenStart& start, std::string_view role) const {
+  const auto found = start.objects.find(std::string(role));
+  if (found == start.objects.end())
+    throw ValueError(
+        fmt::format("{}: the given start has no object with the role '{}'", context(), role));
+  return episode::find_name(model(), mjOBJ_BODY, found->second);
+}
+
+std::vector<int> SceneTask::adopt_scene(int world, const episode::GivenStart& start,
+                                        std::span<const std::string_view> roles,
+                                        const robots::StateRow& state) {
+  scene_.adopt(world, cfg().seed, static_cast<std::uint64_t>(episode(world)), start, state);
+  std::vector<int> indices;
+  for (std::string_view role : roles) {
+    const auto objects = scene_.objects();
+    const auto found = std::ranges::find(objects, body_of(start, role), &SceneObject::body);
+    if (found == objects.end())
+      throw ValueError(fmt::format("{}: '{}' is not an object that can be the {}", context(),
+                                   start.objects.at(std::string(role)), role));
+    indices.push_back(static_cast<int>(found - objects.begin()));
+  }
+  return indices;
 }
 
 std::string SceneTask::context() const {

@@ -3,8 +3,10 @@
 // Base of tasks that use a scene file: cfg.scene, or the task's default scene.
 
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "mjsense_tasks/episode/task.h"
 #include "mjsense_tasks/scenes/episode_scene.h"
@@ -33,6 +35,13 @@ class SceneTask : public episode::Task {
   mjModel world_model(int world) const;
   // Calls EpisodeScene::adopt() for this world's episode.
   std::vector<int> adopt_scene(int world, const robots::StateRow& state);
+  // The same for a given start. Returns the index of the object with each of these roles; throws
+  // ValueError if the start does not have one, or if its body is none of scene().objects().
+  std::vector<int> adopt_scene(int world, const episode::GivenStart& start,
+                               std::span<const std::string_view> roles,
+                               const robots::StateRow& state);
+  // The body with a role in a given start. Throws ValueError.
+  int body_of(const episode::GivenStart& start, std::string_view role) const;
   // Prefix of error messages: "task 'pick': scene 'table'".
   std::string context() const;
 

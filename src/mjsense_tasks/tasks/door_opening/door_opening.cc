@@ -115,6 +115,19 @@ void DoorOpeningTask::choose_goal(int world, Rng& rng, const robots::StateRow& s
   set_object(world, door(world).handle, kHandle);
 }
 
+void DoorOpeningTask::adopt(int world, const episode::GivenStart& start,
+                            const robots::StateRow& state) {
+  adopt_scene(world, start, {}, state);
+  const int body = body_of(start, kRole);
+  const auto found = std::ranges::find_if(
+      doors_, [body](const scenes::Door& d) { return d.body == body || d.handle == body; });
+  if (found == doors_.end())
+    throw ValueError(
+        fmt::format("{}: '{}' is not a door", context(), start.objects.at(std::string(kRole))));
+  episodes_[world].door = static_cast<int>(found - doors_.begin());
+  set_object(world, found->handle, kHandle);
+}
+
 void DoorOpeningTask::begin(const World& world) {
   scenes::ObjectTask::begin(world);
   episodes_[world.id].push = pushes(world);
@@ -126,7 +139,7 @@ bool DoorOpeningTask::pushes(const World& world) const {
 }
 
 episode::Evaluation DoorOpeningTask::evaluate(const World& world) const {
-  const bool success = fraction(world) >= kOpen;
+  const bool success = fraction(world) >= threshold(world.id, "door_openness_threshold", kOpen);
   return make_evaluation_from(world.id, success ? 1.0 : 0.0,
                               success ? "" : "the door is not open far enough");
 }
@@ -168,7 +181,7 @@ void DoorOpeningTask::write_info(const World& world, JsonWriter& json) const {
   const double open = fraction(world);
   json.key("handle_grasped").value(grasped);
   json.key("joint_position").value(open);
-  json.key("success").value(open >= kOpen);
+  json.key("success").value(open >= threshold(world.id, "door_openness_threshold", kOpen));
 }
 
 std::vector<std::pair<std::string, std::string>> DoorOpeningTask::scene_info(int world) const {

@@ -21,6 +21,9 @@ class DoorOpeningTask final : public scenes::ObjectTask {
   explicit DoorOpeningTask(episode::TaskCfg cfg);
   std::string_view name() const override { return "door_opening"; }
   std::string_view type() const override { return "door_open"; }
+  std::map<std::string, double> thresholds() const override {
+    return {{"door_openness_threshold", kOpen}};
+  }
 
   void begin(const World& world) override;
   episode::Evaluation evaluate(const World& world) const override;  // reward: 1 on success, else 0
@@ -51,6 +54,7 @@ class DoorOpeningTask final : public scenes::ObjectTask {
   std::optional<Pose> sample_scene(int world, Rng& rng, const robots::StateRow& state) override;
   std::string paraphrase(const World& world, Rng& rng) const override;
   void choose_goal(int world, Rng& rng, const robots::StateRow& state) override;
+  void adopt(int world, const episode::GivenStart& start, const robots::StateRow& state) override;
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:

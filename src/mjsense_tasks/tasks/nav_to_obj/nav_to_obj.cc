@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -99,6 +100,11 @@ void NavToObjTask::choose_goal(int world, Rng& rng, const robots::StateRow& stat
   std::ranges::copy_if(here, std::back_inserter(unique), [&](int i) { return alone(world, i); });
   if (!unique.empty()) here = std::move(unique);
   if (!here.empty()) set_target(world, here[rng.below(static_cast<std::uint32_t>(here.size()))]);
+}
+
+void NavToObjTask::adopt(int world, const episode::GivenStart& start,
+                         const robots::StateRow& state) {
+  set_target(world, adopt_scene(world, start, std::array{kRole}, state)[0]);
 }
 
 std::optional<Pose> NavToObjTask::sample_scene(int world, Rng& rng, const robots::StateRow& state) {

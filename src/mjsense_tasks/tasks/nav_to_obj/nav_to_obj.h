@@ -55,6 +55,7 @@ class NavToObjTask final : public scenes::ObjectTask {
   std::optional<Pose> sample_scene(int world, Rng& rng, const robots::StateRow& state) override;
   std::string paraphrase(const World& world, Rng& rng) const override;
   void choose_goal(int world, Rng& rng, const robots::StateRow& state) override;
+  void adopt(int world, const episode::GivenStart& start, const robots::StateRow& state) override;
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:

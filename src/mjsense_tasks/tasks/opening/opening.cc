@@ -101,6 +101,11 @@ void OpeningTask::initialize_task() {
   begin_with(articulations_[0].body, articulations_[0].text);
 }
 
+std::map<std::string, double> OpeningTask::thresholds() const {
+  return {{"task_success_threshold", kind_ == OpeningKind::kOpen ? opened() : kClosed},
+          {"any_inst_of_category", kind_ == OpeningKind::kOpen ? 1 : 0}};
+}
+
 double OpeningTask::aim(const Articulation& one) const {
   if (kind_ == OpeningKind::kClose) return one.closed;
   return one.at(std::max(one.slide ? kAimSlide : kAimHinge, opened() + kBeyond));
@@ -178,6 +183,28 @@ std::optional<Pose> OpeningTask::sample_scene(int world, Rng& rng, const robots:
   return base ? base->base : usual;
 }
 
+void OpeningTask::adopt(int world, const episode::GivenStart& start,
+                        const robots::StateRow& state) {
+  adopt_scene(world, start, {}, state);
+  const int body = body_of(start, kRole);
+  const auto is_part = [&](const Articulation& one) {
+    int b = one.body;
+    while (b > 0 && b != body) b = model()->body_parentid[b];
+    return b > 0 && start.joints.contains(scene::name_of(model(), mjOBJ_JOINT, one.joint));
+  };
+  auto found = std::ranges::find(articulations_, body, &Articulation::body);
+  if (found == articulations_.end()) found = std::ranges::find_if(articulations_, is_part);
+  if (found == articulations_.end())
+    throw ValueError(fmt::format("{}: '{}' has no joint with a range and a handle", context(),
+                                 start.objects.at(std::string(kRole))));
+  Target& target = targets_[world];
+  const int index = static_cast<int>(found - articulations_.begin());
+  target.driving = target.driving && target.index == index;
+  target.index = index;
+  target.reached = true;  // whether the robot reaches it is up to the given start
+  set_object(world, found->body, found->text);
+}
+
 void OpeningTask::begin(const World& world) {
   scenes::ObjectTask::begin(world);
   Target& target = targets_[world.id];
@@ -203,6 +230,8 @@ std::string OpeningTask::start_error(const World& world) const {
 double OpeningTask::reward(const World& world) const {
   const Articulation& target = articulations_[targets_[world.id].index];
   if (kind_ == OpeningKind::kClose) return 1 - target.fraction(world.data->qpos[target.qpos]);
+  if (threshold(world.id, "any_inst_of_category", 1) == 0)
+    return target.fraction(world.data->qpos[target.qpos]);
   double maximum = 0;
   for (const Articulation& one : articulations_) {
     if (one.category == target.category)
@@ -211,14 +240,15 @@ double OpeningTask::reward(const World& world) const {
   return maximum;
 }
 
-bool OpeningTask::succeeded(double reward) const {
-  return reward >= (kind_ == OpeningKind::kOpen ? opened() : kClosed);
+bool OpeningTask::succeeded(int world, double reward) const {
+  return reward >= threshold(world, "task_success_threshold",
+                             kind_ == OpeningKind::kOpen ? opened() : kClosed);
 }
 
 episode::Evaluation OpeningTask::evaluate(const World& world) const {
   const double reward = this->reward(world);
   return make_evaluation_from(world.id, reward,
-                              succeeded(reward)             ? ""
+                              succeeded(world.id, reward)   ? ""
                               : kind_ == OpeningKind::kOpen ? "it is not open far enough"
                                                             : "it is not closed far enough");
 }
@@ -284,7 +314,7 @@ void OpeningTask::write_info(const World& world, JsonWriter& json) const {
   const auto first = std::ranges::find(articulations_, target.category, &Articulation::category);
   json.key("episode_step").value(episode_step(world.id));
   json.key("joint_position").value(world.data->qpos[first->qpos]);
-  json.key("success").value(succeeded(reward(world)));
+  json.key("success").value(succeeded(world.id, reward(world)));
 }
 
 }  // namespace mjsense::tasks

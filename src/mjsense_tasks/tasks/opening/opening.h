@@ -27,6 +27,7 @@ class OpeningTask final : public scenes::ObjectTask {
   OpeningTask(episode::TaskCfg cfg, OpeningKind kind);
   std::string_view name() const override { return type(); }
   std::string_view type() const override { return kind_ == OpeningKind::kOpen ? "open" : "close"; }
+  std::map<std::string, double> thresholds() const override;
   // Rejects starts in which an object penetrates another one, or in which the target is unreachable
   // from every base placement.
   std::string start_error(const World& world) const override;
@@ -63,6 +64,7 @@ class OpeningTask final : public scenes::ObjectTask {
   void initialize_task() override;
   std::optional<Pose> sample_scene(int world, Rng& rng, const robots::StateRow& state) override;
   std::string paraphrase(const World& world, Rng& rng) const override;
+  void adopt(int world, const episode::GivenStart& start, const robots::StateRow& state) override;
 
  private:
   struct Target {
@@ -73,7 +75,7 @@ class OpeningTask final : public scenes::ObjectTask {
   };
   std::vector<std::string> references(const World& world) const;
   double reward(const World& world) const;
-  bool succeeded(double reward) const;
+  bool succeeded(int world, double reward) const;
   struct Found {
     Pose base;
     bool driving;

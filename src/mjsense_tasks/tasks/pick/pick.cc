@@ -43,6 +43,10 @@ constexpr std::array<const char*, 15> kPickSentences{"Pick up {}",
 
 PickTask::PickTask(episode::TaskCfg cfg) : scenes::ObjectTask(std::move(cfg), kPickScene, kRole) {}
 
+std::map<std::string, double> PickTask::thresholds() const {
+  return {{"succ_pos_threshold", kLift}};
+}
+
 void PickTask::initialize_task() {
   scenes::ObjectTask::initialize_task();
   things_ = scene().pickup_objects();
@@ -85,6 +89,12 @@ void PickTask::choose_object(int world, int body, const robots::StateRow& state)
   scene().set_target(world, *found, state);
 }
 
+void PickTask::adopt(int world, const episode::GivenStart& start, const robots::StateRow& state) {
+  const int target = adopt_scene(world, start, std::array{kRole}, state)[0];
+  set_target(world, target);
+  scene().set_target(world, target, state);
+}
+
 void PickTask::set_target(int world, int target) {
   const scenes::SceneObject& object = scene().objects()[target];
   targets_[world] = target;
@@ -109,7 +119,8 @@ bool PickTask::supported_by_others(const World& world, int body) const {
 // The unmet condition of success; "" if only the robot holds the object in the air.
 std::string_view PickTask::missing(const World& world) const {
   const int body = object(world.id).body;
-  if (world.data->xpos[3 * body + 2] - start(world.id).p.z < kLift)
+  if (world.data->xpos[3 * body + 2] - start(world.id).p.z <
+      threshold(world.id, "succ_pos_threshold", kLift))
     return "the object is not lifted";
   bool held = false, others = false;
   observe::each_touch(world, body, [&](const observe::Touch& touch) {

@@ -21,6 +21,7 @@ class PickTask final : public scenes::ObjectTask, public episode::GraspScene {
   explicit PickTask(episode::TaskCfg cfg);
   std::string_view name() const override { return "pick"; }
   std::string_view type() const override { return "pick"; }
+  std::map<std::string, double> thresholds() const override;
 
   // In a state that another task has sampled: makes this body the object of the episode. Throws
   // ValueError if it cannot be picked up.
@@ -52,6 +53,7 @@ class PickTask final : public scenes::ObjectTask, public episode::GraspScene {
   std::optional<Pose> sample_scene(int world, Rng& rng, const robots::StateRow& state) override;
   std::string paraphrase(const World& world, Rng& rng) const override;
   void choose_goal(int world, Rng& rng, const robots::StateRow& state) override;
+  void adopt(int world, const episode::GivenStart& start, const robots::StateRow& state) override;
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:

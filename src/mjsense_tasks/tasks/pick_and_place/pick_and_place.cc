@@ -157,15 +157,27 @@ std::optional<Pose> PickAndPlaceTask::sample_scene(int world, Rng& rng,
   const auto number = static_cast<std::uint64_t>(this->episode(world));
   vary_scene(world);
   const std::vector<int> wanted = choose(world, rng);
+  set_objects(world, wanted[0], wanted[1]);
+  return standing_(scene().sample(world, wanted, cfg().seed, number, rng, state));
+}
+
+void PickAndPlaceTask::set_objects(int world, int target, int receptacle) {
   Episode& episode = episodes_[world];
-  episode.target = wanted[0];
-  episode.receptacle = wanted[1];
+  episode.target = target;
+  episode.receptacle = receptacle;
   for (int k = 0; k < 2; ++k) {
-    const scenes::SceneObject& object = scene().objects()[wanted[k]];
+    const scenes::SceneObject& object = scene().objects()[k == 0 ? target : receptacle];
     episode.objects[k].body = object.body;
     episode.objects[k].name = object.text;
   }
-  return standing_(scene().sample(world, wanted, cfg().seed, number, rng, state));
+}
+
+void PickAndPlaceTask::adopt(int world, const episode::GivenStart& start,
+                             const robots::StateRow& state) {
+  const std::vector<int> chosen =
+      adopt_scene(world, start, std::array{kObject, kReceptacle}, state);
+  set_objects(world, chosen[0], chosen[1]);
+  scene().set_target(world, chosen[0], state);
 }
 
 void PickAndPlaceTask::begin(const World& world) {
@@ -208,15 +220,38 @@ const PickAndPlaceTask::Assessment& PickAndPlaceTask::assess(const World& world)
   // about this axis is not tilt.
   const Vec3 up = rotate(conjugate(episode.receptacle_start.q), {0, 0, 1});
   now.tilted = std::acos(std::clamp(rotate(of_receptacle.q, up).z, -1.0, 1.0));
-  now.missing = kind_ == PlaceKind::kNextTo ? missing_beside(world, now) : missing_within(now);
+  now.missing =
+      kind_ == PlaceKind::kNextTo ? missing_beside(world, now) : missing_within(world.id, now);
   return now;
 }
 
-std::string_view PickAndPlaceTask::missing_within(const Assessment& now) {
+std::map<std::string, double> PickAndPlaceTask::thresholds() const {
+  const bool beside = kind_ == PlaceKind::kNextTo;
+  std::map<std::string, double> all{
+      {"max_place_receptacle_pos_displacement", beside ? kMovedBeside : kMoved},
+      {"max_place_receptacle_rot_displacement", kTurned}};
+  if (beside) all["max_surface_to_surface_gap"] = kBeside;
+  return all;
+}
+
+double PickAndPlaceTask::max_gap(int world) const {
+  return threshold(world, "max_surface_to_surface_gap", kBeside);
+}
+
+double PickAndPlaceTask::max_moved(int world) const {
+  return threshold(world, "max_place_receptacle_pos_displacement",
+                   kind_ == PlaceKind::kNextTo ? kMovedBeside : kMoved);
+}
+
+double PickAndPlaceTask::max_turned(int world) const {
+  return threshold(world, "max_place_receptacle_rot_displacement", kTurned);
+}
+
+std::string_view PickAndPlaceTask::missing_within(int world, const Assessment& now) const {
   if (!now.supported && !now.carried_forward) return "the receptacle does not carry the object";
   if (now.robot_contact) return "the robot touches the object";
-  if (norm(now.moved) > kMoved) return "the receptacle has moved";
-  return now.tilted > kTurned ? "the receptacle is tilted" : "";
+  if (norm(now.moved) > max_moved(world)) return "the receptacle has moved";
+  return now.tilted > max_turned(world) ? "the receptacle is tilted" : "";
 }
 
 std::string_view PickAndPlaceTask::missing_beside(const World& world, const Assessment& now) const {
@@ -224,8 +259,9 @@ std::string_view PickAndPlaceTask::missing_beside(const World& world, const Asse
   const int object = episode.objects[0].body, other = episode.objects[1].body;
   const Aabb a = world_box(world, object), b = world_box(world, other);
   const double gap = gap_from_above(a, b);
-  if (gap < 0 || gap > kBeside) return "the object is not next to the other one";
-  if (norm(now.moved) > kMovedBeside || now.turned > kTurned) return "the other object has moved";
+  if (gap < 0 || gap > max_gap(world.id)) return "the object is not next to the other one";
+  if (norm(now.moved) > max_moved(world.id) || now.turned > max_turned(world.id))
+    return "the other object has moved";
   const int under = supporting_body(world, object), under_other = supporting_body(world, other);
   const bool together = under >= 0 && under_other >= 0 ? under == under_other
                                                        : std::abs(a.low.z - b.low.z) <= kSameHeight;
@@ -238,7 +274,7 @@ std::string PickAndPlaceTask::start_error(const World& world) const {
   const auto& objects = episodes_[world.id].objects;
   const double gap =
       gap_from_above(world_box(world, objects[0].body), world_box(world, objects[1].body));
-  if (gap < 0 || gap > kBeside) return "";
+  if (gap < 0 || gap > max_gap(world.id)) return "";
   return fmt::format("{}: the {} is already next to the {}", context(), objects[0].name,
                      objects[1].name);
 }

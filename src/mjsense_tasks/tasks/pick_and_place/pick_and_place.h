@@ -29,6 +29,7 @@ class PickAndPlaceTask final : public scenes::SceneTask,
   // pick_and_place, pick_and_place_next_to, pick_and_place_color, packing.
   std::string_view name() const override;
   std::string_view type() const override { return name(); }
+  std::map<std::string, double> thresholds() const override;
 
   // Rejects starts in which an object penetrates another one, or in which the object is already
   // next to the other object (kNextTo).
@@ -68,6 +69,7 @@ class PickAndPlaceTask final : public scenes::SceneTask,
   void initialize_task() override;
   std::optional<Pose> sample_scene(int world, Rng& rng, const robots::StateRow& state) override;
   std::string paraphrase(const World& world, Rng& rng) const override;
+  void adopt(int world, const episode::GivenStart& start, const robots::StateRow& state) override;
   std::vector<std::pair<std::string, std::string>> scene_info(int world) const override;
 
  private:
@@ -89,8 +91,13 @@ class PickAndPlaceTask final : public scenes::SceneTask,
     Assessment assessment;
   };
   const Assessment& assess(const World& world) const;
-  static std::string_view missing_within(const Assessment& now);
+  std::string_view missing_within(int world, const Assessment& now) const;
+  // Maximum gap, displacement (m) and rotation (rad) with which an episode succeeds.
+  double max_gap(int world) const;
+  double max_moved(int world) const;
+  double max_turned(int world) const;
   std::string_view missing_beside(const World& world, const Assessment& now) const;
+  void set_objects(int world, int target, int receptacle);
   std::vector<int> choose(int world, Rng& rng) const;
   Rng place_rng(int world) const;
   void places_beside(const World& world, const Quat& turn, std::vector<Vec3>& out) const;
