@@ -25,6 +25,9 @@ foreach(folder IN LISTS MJSENSE_ROOMS)
     target_compile_options(${room}_test PRIVATE -Wall -Wextra -Wno-missing-field-initializers
                            $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
     add_test(NAME ${room} COMMAND ${room}_test)
+    if(CMAKE_CROSSCOMPILING)
+      set_tests_properties(${room} PROPERTIES TIMEOUT 7200)  # s
+    endif()
     set(left_out ${MJSENSE_LEFT_OUT})
     list(FILTER left_out INCLUDE REGEX "^without ${room} ")
     if(left_out)
