@@ -2,6 +2,11 @@
 # One test program per module, built from the x_test.cc files in its folder. ctest runs each program as one test. Programs of the first
 # library are linked without the second.
 find_package(GTest REQUIRED)
+# Under an emulator the slowest tests are left out (tests/emulated.txt).
+if(CMAKE_CROSSCOMPILING)
+  file(STRINGS ${PROJECT_SOURCE_DIR}/tests/emulated.txt MJSENSE_LEFT_OUT REGEX "^without ")
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/emulated.txt)
+endif()
 file(GLOB MJSENSE_ROOMS CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/mjsense/* ${PROJECT_SOURCE_DIR}/src/mjsense_tasks/*)
 foreach(folder IN LISTS MJSENSE_ROOMS)
   get_filename_component(room ${folder} NAME)
@@ -20,6 +25,16 @@ foreach(folder IN LISTS MJSENSE_ROOMS)
     target_compile_options(${room}_test PRIVATE -Wall -Wextra -Wno-missing-field-initializers
                            $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
     add_test(NAME ${room} COMMAND ${room}_test)
+    if(CMAKE_CROSSCOMPILING)
+      set_tests_properties(${room} PROPERTIES TIMEOUT 7200)  # s
+    endif()
+    set(left_out ${MJSENSE_LEFT_OUT})
+    list(FILTER left_out INCLUDE REGEX "^without ${room} ")
+    if(left_out)
+      list(TRANSFORM left_out REPLACE "^without [^ ]+ ([^ ]+).*" "\\1")
+      list(JOIN left_out ":" left_out)
+      set_tests_properties(${room} PROPERTIES ENVIRONMENT "GTEST_FILTER=-${left_out}")
+    endif()
   endif()
 endforeach()
 

@@ -5,6 +5,7 @@
 //
 //   golden_test [FILE]      compares; 0 equal, 1 different, 77 no hashes for this CPU
 //   golden_test --print     prints this CPU's lines, with the kernels that MJSENSE_ISA names
+//   golden_test --values FILE  writes what is hashed, for compare.py
 
 #include <fmt/format.h>
 
@@ -37,29 +38,39 @@
 namespace mjsense {
 namespace {
 
-// FNV-1a, 64 bits.
+bool keep_values = false;
+
+// FNV-1a, 64 bits, of rows. Has the rows themselves if they are kept.
 class Hash {
  public:
-  void add(const void* data, std::size_t bytes) {
+  void add(DType dtype, const void* data, std::size_t bytes) {
     const auto* p = static_cast<const unsigned char*>(data);
     for (std::size_t i = 0; i < bytes; ++i) value_ = (value_ ^ p[i]) * 0x100000001b3ull;
+    if (!keep_values) return;
+    dtype_ = dtype;
+    rows_.append(static_cast<const char*>(data), bytes);
   }
   std::string text() const { return fmt::format("{:016x}", value_); }
+  DType dtype() const { return dtype_; }
+  const std::string& rows() const { return rows_; }
 
  private:
   std::uint64_t value_ = 0xcbf29ce484222325ull;
+  DType dtype_ = DType::kFloat64;
+  std::string rows_;
 };
 
 using Hashes = std::map<std::string, Hash>;  // by "state" or "sensor field"
 
 void add_state(sim::Simulation& sim, Hashes& out) {
   const ArrayView state = sim.worlds().state();
-  out["state"].add(state.data, state.bytes());
+  out["state"].add(DType::kFloat64, state.data, state.bytes());
 }
 
 void add_rows(const Sensor& sensor, Hashes& out) {
   for (const Field& f : sensor.fields())
-    out[sensor.name() + (f.name.empty() ? "" : "/" + f.name)].add(f.data.data(), f.data.bytes());
+    out[sensor.name() + (f.name.empty() ? "" : "/" + f.name)].add(f.spec.dtype, f.data.data(),
+                                                                  f.data.bytes());
 }
 
 template <class Cfg, class Fill>
@@ -136,7 +147,7 @@ Hashes pick() {
     for (const auto& sensor : rollout.suite().sensors()) add_rows(*sensor, out);
     for (const int w : worlds) {
       const tasks::episode::Evaluation& e = rollout.evaluation(w);
-      out["reward"].add(&e.reward, sizeof e.reward);
+      out["reward"].add(DType::kFloat64, &e.reward, sizeof e.reward);
     }
     rollout.act();
     rollout.step();
@@ -411,6 +422,18 @@ Lines read(const std::string& path) {
   return lines;
 }
 
+// A line "scene what|dtype|bytes" before the bytes of each.
+void write_values(const std::string& path) {
+  keep_values = true;
+  std::ofstream out(path, std::ios::binary);
+  for (const auto& [scene, play_it] : kScenes) {
+    for (const auto& [what, hash] : play_it())
+      out << fmt::format("{} {}|{}|{}\n", scene, what, dtype_name(hash.dtype()), hash.rows().size())
+          << hash.rows();
+  }
+  if (!out.flush()) throw RuntimeError(fmt::format("golden: cannot write '{}'", path));
+}
+
 int run(const std::string& path) {
   const bool print = path == "--print";
   const std::string cpu = cpu_level(), kernels(isa_name(cpu_isa())),
@@ -460,6 +483,7 @@ int run(const std::string& path) {
 
 int main(int argc, char** argv) {
   try {
+    if (argc == 3 && std::string(argv[1]) == "--values") return mjsense::write_values(argv[2]), 0;
     return mjsense::run(argc > 1 ? argv[1] : MJSENSE_GOLDEN_FILE);
   } catch (const mjsense::RuntimeError&
                error) {  // MJSENSE_ISA names an instruction set that this CPU lacks

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "mjsense/core/system/cpu.h"
 #include "mjsense/render/testing/test_renderer.h"
 
 namespace mjsense::render {
@@ -109,14 +110,14 @@ TEST(Physical, OnlyColoursDiffer) {
 }
 
 TEST(Physical, InstructionSetsAgree) {
-  if (best_render_tiles() != render_tiles_avx512) GTEST_SKIP() << "the CPU has no AVX-512";
+  if (cpu_isa() < Isa::kAvx512) GTEST_SKIP() << "the CPU has no AVX-512";
   TestRenderer s(kScene);
   s.options.shadows = true;
   s.options.physical = linear(0.5);
   const auto grid = grid_from_fovy(320, 240, 45, false);
   const auto shot = [&] { return s.take({0, 0, 3}, kX, kY, grid).rgb; };
   const auto wide = shot();
-  s.render = render_tiles_avx2;
+  if constexpr (kHasAvx) s.render = render_tiles_avx2;
   const auto narrow = shot();
   int differ = 0;
   for (std::size_t i = 0; i < wide.size(); ++i) {
