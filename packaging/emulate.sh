@@ -17,5 +17,7 @@ if [ "$1" = --inside ]; then
     mount -t tmpfs tmpfs "$root/tmp"
     exec chroot "$root" /usr/bin/env -i PATH=/usr/local/bin:/usr/bin:/bin HOME=/tmp "$@"' bash "$@"
 fi
+# Without OpenGL: Mesa's software renderer crashes under qemu.
+export __EGL_VENDOR_LIBRARY_DIRS=/nonexistent
 QEMU_LD_PREFIX=$root exec unshare --user --map-root-user --mount bash -euc "$register"'
   exec "$@"' bash "$@"
