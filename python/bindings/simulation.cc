@@ -136,10 +136,11 @@ void set_timestep(PySimulation& self, double seconds) {
     }
     for (const auto& sensor : sim.scene().sensors()) {
       if (counts_steps(*sensor))
-        throw ValueError(fmt::format(
-            "timestep: the noise, delays, ray times or exposures of sensor '{}' are in steps of {:g} s: set "
-            "SceneCfg(options=MujocoCfg(timestep={:g})) before the scene is made",
-            sensor->name(), sim.model()->opt.timestep, seconds));
+        throw ValueError(
+            fmt::format("timestep: the noise, delays, ray times or exposures of sensor '{}' are in "
+                        "steps of {:g} s: set "
+                        "SceneCfg(options=MujocoCfg(timestep={:g})) before the scene is made",
+                        sensor->name(), sim.model()->opt.timestep, seconds));
     }
     if (sim.model()->nhistory > 0)
       throw ValueError(
