@@ -78,7 +78,8 @@ def standing_motion(task: str) -> str:
         "body_ang_vel_w": 0 * data.xpos[bodies],
     }
     path = Path(tempfile.mkdtemp()) / "motion.npz"
-    np.savez(path, fps=50, **{name: np.repeat(value[None], frames, 0).astype(np.float32) for name, value in values.items()})
+    arrays: dict[str, Any] = {name: np.repeat(value[None], frames, 0).astype(np.float32) for name, value in values.items()}
+    np.savez(path, fps=50, **arrays)
     return str(path)
 
 
