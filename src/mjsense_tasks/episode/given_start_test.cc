@@ -70,7 +70,9 @@ TEST(GivenStart, InvalidTextsThrow) {
            {R"({"1": {"bodies": {"a": [0, 0, 0, 0, 0, 0, 0]}}})", "whose quaternion is not 0"},
            {R"({"1": {"robot": {"arm": "x"}}})", "must be a list of finite numbers"},
            {R"({"1": {"scene": 1}})", "the unknown member 'scene'"}}) {
-    EXPECT_THAT(error_of<ValueError>([&] { read_starts(text); }), HasSubstr(message)) << text;
+    EXPECT_THAT(error_of<ValueError>([&, &given = text] { read_starts(given); }),
+                HasSubstr(message))
+        << text;
   }
 }
 
