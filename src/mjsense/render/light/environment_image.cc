@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 #include "mjsense/render/light/cube_map.h"
 #include "mjsense/render/light/tone_map.h"

@@ -11,6 +11,7 @@
 #include "mjsense/core/model_geometry.h"
 #include "mjsense/core/mujoco_call.h"
 #include "mjsense/core/mujoco_objects.h"
+#include "mjsense/scene/resolve.h"
 #include "mjsense_tasks/scenes/object_references.h"
 
 namespace mjsense::tasks {
