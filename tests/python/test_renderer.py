@@ -41,6 +41,22 @@ def test_depth_of_a_ball_is_that_of_the_sphere():
     assert not images["rgb"][0, 0].any()
 
 
+def test_walls_of_a_height_field_reach_its_heights_above_one():
+    # camera |----- 2 m -----[ a field of the height 2 size[2] = 1.4 m; the camera looks at 1.05 m
+    model = mujoco.MjModel.from_xml_string(
+        """<mujoco><visual><map znear="0.01" zfar="50"/></visual><statistic extent="1" center="0 0 0"/>
+        <asset><hfield name="h" nrow="3" ncol="3" size="1 1 .7 .1"/></asset><worldbody><light pos="0 0 3"/>
+        <camera name="side" pos="0 -3 1.05" xyaxes="1 0 0 0 0 1"/><geom type="hfield" hfield="h"/></worldbody></mujoco>"""
+    )
+    model.hfield_data[:] = 2  # the compiler scales heights to 0..1, programs write others
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    with mjs.Renderer(model, 11, 11) as renderer:
+        renderer.enable_depth_rendering()
+        renderer.update_scene(data, "side")
+        assert renderer.render()[5, 5] == pytest.approx(2, abs=1e-5)
+
+
 def test_properties_and_defaults():
     model, data = load(BALL)
     renderer = mjs.Renderer(model)

@@ -166,8 +166,8 @@ inline PacketMask trace_triangles(const Tracing& at, const Pixels* pixels, Hits*
 inline bool trace_walls_of_packet(const Tracing& at, const Pixels& pixels, Hits& hits) {
   const ViewGeom& g = at.geom;
   const rays::HeightField& f = *g.height_field;
-  const float center[3] = {0, 0, 0.5f * (f.size[2] - f.size[3])};
-  const float half[3] = {f.size[0], f.size[1], 0.5f * (f.size[2] + f.size[3])};
+  const float center[3] = {0, 0, 0.5f * (f.lid - f.size[3])};
+  const float half[3] = {f.size[0], f.size[1], 0.5f * (f.lid + f.size[3])};
   bool changed = false;
   for (int k = 0; k < kLanes; k += kWidth) {
     const LocalRay ray = at.ray(pixels, k);
