@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a ``mujoco_warp.RenderContext`` asks for, and whether mjsense draws it."""
+"""The settings of a ``mujoco_warp.RenderContext``, and whether mjsense draws its images."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ _ON = ("use_ambient_lighting", "enable_backface_culling", "enable_specular", "en
 
 def reason_to_leave(model: Any, source: Any, rc: Any) -> str:
     """Why images of this context are mujoco_warp's own; empty if mjsense draws them. `source`: the ``MjModel``."""
+    if hasattr(rc, "samples_per_pixel"):
+        return "mujoco_warp 4.0 shades in another way than 3.11"
     off = [name for name in _ON if not getattr(rc, name, True)]
     if off:
         return f"{off[0]} is False"

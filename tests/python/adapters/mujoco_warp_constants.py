@@ -17,6 +17,7 @@ wp.config.log_level = 40
 wp.set_device("cpu")
 warnings.simplefilter("ignore", DeprecationWarning)
 import mjsense.compat.mujoco_warp as compat
+from mjsense.compat import _warp_constants as constants
 
 WORLDS = 4
 MODEL = mujoco.MjModel.from_xml_string("""
@@ -37,7 +38,7 @@ MODEL = mujoco.MjModel.from_xml_string("""
   <actuator><position name="servo" joint="first" kp="20"/><motor joint="second"/><general tendon="fixed" gainprm="3"/></actuator>
 </mujoco>""")
 INPUTS = ("body_mass", "body_inertia", "body_ipos", "dof_armature", "qpos0", "body_pos")
-FIELDS = (*compat._FIXED, *(name for name in (*compat._KINEMATICS, *compat._INERTIA) if name != "eq_data"))
+FIELDS = (*constants._FIXED, *(name for name in (*constants._KINEMATICS, *constants._INERTIA) if name != "eq_data"))
 POSITIONS = ("xpos", "xquat", "xipos", "geom_xpos", "site_xmat", "cam_xpos", "light_xpos", "subtree_com", "cdof", "cinert", "ten_length")
 if hasattr(mjw, "SetConstGroup"):  # version 4.0 does not restore these
     POSITIONS = tuple(name for name in POSITIONS if not name.startswith(("cam", "light")))

@@ -100,6 +100,7 @@ own = start()
 mjw.step(*own)
 before = [mjw.step]  # a list: names of modules are replaced, too
 import mjsense.compat.mujoco_warp as compat
+from mjsense.compat import _warp_graphs as graphs
 
 with compat.used():
     assert step_of_a_module is mjw.step is not before[0]
@@ -289,7 +290,7 @@ with wp.ScopedCapture() as failing:
     mjw.step(*few)
 raises(ValueError, r"make it with nconmax=\d+", lambda: wp.capture_launch(failing.graph))
 wp.capture_launch(capture.graph)  # works after the error of another one
-assert len(compat._in_graphs) == 3
+assert len(graphs._in_graphs) == 3
 capture = failing = graphed = None
 
 # Two simulations in two threads.
@@ -313,4 +314,4 @@ program = few = called = pairs = alone = None
 import gc
 
 gc.collect()
-assert (len(compat._worlds), len(compat._models)) < kept and not compat._in_graphs
+assert (len(compat._worlds), len(compat._models)) < kept and not graphs._in_graphs
