@@ -67,21 +67,23 @@ class Page:
         return self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)["result"].get("value")
 
     def click(self, selector, text):
-        """Clicks the element of this selector and text once it is there and has stopped moving."""
-        before, end = None, time.monotonic() + 30
-        while True:
+        """Clicks the element of this selector and text. A click that the element did not receive is repeated, because a busy machine moves
+        the elements of a page late."""
+        before, end = None, time.monotonic() + 60
+        while not self.run("window.clicked"):
             where = self.run(f"""(() => {{
                 const found = [...document.querySelectorAll({json.dumps(selector)})].find((e) => e.textContent.trim() == {json.dumps(text)});
                 if (!found) return null;
+                found.addEventListener("click", () => {{ window.clicked = true; }});
                 const box = found.getBoundingClientRect();
                 return [box.x + box.width / 2, box.y + box.height / 2]; }})()""")
             if where and where == before:
-                break
+                for kind in ("mousePressed", "mouseReleased"):
+                    self.call("Input.dispatchMouseEvent", type=kind, x=where[0], y=where[1], button="left", clickCount=1)
             assert time.monotonic() < end, f"no {selector} with the text {text}"
             before = where
             time.sleep(0.5)
-        for kind in ("mousePressed", "mouseReleased"):
-            self.call("Input.dispatchMouseEvent", type=kind, x=where[0], y=where[1], button="left", clickCount=1)
+        self.run("window.clicked = false")
 
     def screenshot(self, path):
         Path(path).write_bytes(base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"]))

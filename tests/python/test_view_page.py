@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The viewer's page in headless Chromium."""
 
-import contextlib
 import os
 import re
 import signal
@@ -133,12 +132,7 @@ def test_ctrl_c_while_a_page_plays(port):
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ) as process:
         try:
             with devtools.Page(process.stdout.readline().split()[1]) as page:
-                playing = "[...document.querySelectorAll('button')].some((e) => e.textContent.trim() == 'Pause')"
-                for _ in range(4):  # a click can be lost while a busy machine draws the page
-                    page.click("button", "Play")
-                    with contextlib.suppress(AssertionError):
-                        eventually(lambda: page.run(playing), 20)
-                        break
+                page.click("button", "Play")
                 eventually(lambda: re.search(r"World 1 of 2, t = (0\.[1-9]|[1-9])", page.run("document.body.textContent")), 90)
                 process.send_signal(signal.SIGINT)
                 out, errors = process.communicate(timeout=30)
