@@ -4,38 +4,62 @@
 // where they are above the surface's horizon, other geoms as spheres. There is no noise, and no ray is
 // cast. Part of the tile kernels.
 
+#include <cmath>
+
 #include "mjsense/render/kernels/surfaces.h"
+#include "mjsense/render/view/tile_kernels.h"
 
 namespace mjsense::render {
 namespace {
 
-// The geoms that may hide the environment from the points of a tile.
+// The geoms that may hide the environment from the points of a tile, and their boxes.
 struct Occluders {
   const int* list = nullptr;
+  OccluderBoxes boxes;
   int count = 0;
   bool moving = false;  // some are not fixed
 };
 
-// Finds those of `part` for points in a box. `list` has room for all geoms of the view.
+// Which of kWidth boxes, from number i on, may hide the environment from points in a sphere.
+inline std::uint32_t boxes_near(const OccluderBoxes& boxes, int i, const float* center,
+                                float radius) {
+  using Boxes = OccluderBoxes;
+  const auto row = [&](int k) { return loadu(boxes.row(k) + i); };
+  const Float x = splat(center[0]), y = splat(center[1]), z = splat(center[2]);
+  Float square = splat(0.0f);
+  for (int k = 0; k < 3; ++k) {
+    const Float local = fma(row(Boxes::kRotation + k), x,
+                            fma(row(Boxes::kRotation + 3 + k), y,
+                                fma(row(Boxes::kRotation + 6 + k), z, row(Boxes::kOrigin + k))));
+    const Float away = max(abs(local) - row(Boxes::kHalf + k), splat(0.0f));
+    square = fma(away, away, square);
+  }
+  const Float far = row(Boxes::kReach) + splat(radius);
+  return bits((splat(0.0f) < far) & (square < far * far));
+}
+
+// Finds those of `part` for points between `low` and `high`, in the memory of `scratch`.
 inline void find_occluders(const View& view, Part part, const float* low, const float* high,
-                           int* list, Occluders& out) {
-  out = {list, 0, false};
+                           TileScratch& scratch, Occluders& out) {
+  out = {scratch.occluders, scratch.occluder_boxes, 0, false};
   if (low[0] > high[0]) return;
-  const OccluderSpheres& s = view.occluders;
-  const auto beyond = [](Float x, float from, float to) {
-    return max(max(splat(from) - x, x - splat(to)), splat(0.0f));
-  };
+  float center[3], square = 0;
+  for (int c = 0; c < 3; ++c) {
+    center[c] = 0.5f * (low[c] + high[c]);
+    const float half = 0.5f * (high[c] - low[c]);
+    square += half * half;
+  }
+  const float radius = std::sqrt(square);
   for (int i = 0; i < view.num_geoms; i += kWidth) {
-    const Float dx = beyond(loadu(s.x + i), low[0], high[0]),
-                dy = beyond(loadu(s.y + i), low[1], high[1]),
-                dz = beyond(loadu(s.z + i), low[2], high[2]), radius = loadu(s.radius + i);
-    std::uint32_t near =
-        bits((splat(0.0f) < radius) & (fma(dx, dx, fma(dy, dy, dz * dz)) < radius * radius));
-    for (; near; near &= near - 1) {
+    for (std::uint32_t near = boxes_near(view.occluders, i, center, radius); near;
+         near &= near - 1) {
       const int g = i + __builtin_ctz(near);
       if (g >= view.num_geoms) return;
       if (!belongs(view.geoms[g], part)) continue;
-      list[out.count++] = g;
+      scratch.occluders[out.count] = g;
+      for (int k = 0; k < OccluderBoxes::kRows; ++k)
+        out.boxes.row(k)[out.count] = view.occluders.row(k)[g];
+      ++out.count;
       out.moving |= !view.geoms[g].fixed;
     }
   }
@@ -89,17 +113,20 @@ inline Float hidden_by_box(const float* half, Vec3f p, Vec3f n) {
   return sum;
 }
 
-// Part of the hemisphere that a sphere at `to` (from the point) hides.
-inline Float hidden_by_sphere(Vec3f to, Float radius, Vec3f n) {
-  const Float square = max(dot(to, to), splat(1e-12f));
-  const Float cosine = dot(to, n) / sqrt(square);
-  return max(cosine, splat(0.0f)) * min(radius * radius / square, splat(1.0f));
-}
-
 // 1 at the geom and 0 at the distance `reach` (m) or more, of which `square` is the square.
 inline Float fade(Float square, float reach) {
   const Float left = max(splat(1.0f) - square * splat(1 / (reach * reach)), splat(0.0f));
   return left * left;
+}
+
+// Part of the hemisphere that a sphere at `to` (from the point) hides.
+inline Float hidden_by_sphere(Vec3f to, float radius, Vec3f n, float reach) {
+  const Float zero = splat(0.0f), one = splat(1.0f);
+  const Float square = max(dot(to, to), splat(1e-12f));
+  const Float closeness = one / sqrt(square);
+  const Float away = max(fma(square, closeness, splat(-radius)), zero);
+  const Float size = min(splat(radius) * closeness, one);
+  return max(dot(to, n) * closeness, zero) * size * size * fade(away * away, reach);
 }
 
 // A geom in its own frame, as a sphere swept along its longer axes.
@@ -111,8 +138,7 @@ inline Float hidden_by_rounded(const float* half, Vec3f p, Vec3f n, float reach)
   };
   const Vec3f to{nearest(p.x, half[0]) - p.x, nearest(p.y, half[1]) - p.y,
                  nearest(p.z, half[2]) - p.z};
-  const Float away = max(sqrt(dot(to, to)) - splat(thin), splat(0.0f));
-  return hidden_by_sphere(to, splat(thin), n) * fade(away * away, reach);
+  return hidden_by_sphere(to, thin, n, reach);
 }
 
 inline Float hidden_by(const ViewGeom& g, Vec3f p, Vec3f n, float reach) {
@@ -128,8 +154,7 @@ inline Float hidden_by(const ViewGeom& g, Vec3f p, Vec3f n, float reach) {
   }
   if (g.type == mjGEOM_SPHERE) {
     const Vec3f to{-local.x, -local.y, -local.z};
-    const Float away = max(sqrt(dot(to, to)) - splat(g.size[0]), zero);
-    return hidden_by_sphere(to, splat(g.size[0]), normal) * fade(away * away, reach);
+    return hidden_by_sphere(to, g.size[0], normal, reach);
   }
   const Vec3f q = local - splat(g.aabb);
   const float* half = g.aabb + 3;
@@ -146,42 +171,44 @@ inline Float hidden_by(const ViewGeom& g, Vec3f p, Vec3f n, float reach) {
   return select(some, hidden_by_box(half, q, normal) * near, zero);
 }
 
-// Distance up to which a geom hides the environment, m.
-inline float reach_of(const View& view, const ViewGeom& g) {
-  const float reach = view.physical.occlusion_reach, own = 4 * g.radius;
-  return own < reach ? own : reach;
-}
-
-// Whether the geom's bounding sphere is near the point, and not wholly below the surface's horizon. It
-// takes a tenth of the time of hidden_by(), and most geoms of a tile's list are far from most of its
-// pixels.
-inline Mask may_hide(const ViewGeom& g, Vec3f p, Vec3f n, float reach) {
-  if (g.type == mjGEOM_PLANE) return splat(0.0f) < splat(1.0f);
-  const Vec3f to = splat(g.center) - p;
-  const float far = g.radius + reach;
-  return (dot(to, to) < splat(far * far)) & (splat(-g.radius) < dot(to, n));
+// A sphere around the points of `lanes`.
+inline float sphere_around(const Surfaces& s, std::uint32_t lanes, float* center) {
+  const int middle = __builtin_ctz(lanes);
+  for (int c = 0; c < 3; ++c) center[c] = s.p[c][middle];
+  Float square = splat(0.0f);
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Vec3f away = load3(s.p, k) - splat(center);
+    square = max(square, select(mask_of(lanes >> k & kAllLanes), dot(away, away), splat(0.0f)));
+  }
+  return std::sqrt(lane_max(square));
 }
 
 // Part of the environment's light that reaches the points of `lanes`, 0..1.
-inline void open_sky(const View& view, const Occluders& near, const Surfaces& s, const Hits& hits,
+inline void open_sky(const View& view, const Occluders& tile, const Surfaces& s, const Hits& hits,
                      std::uint32_t lanes, float* out) {
-  for (int k = 0; k < kLanes; k += kWidth) {
-    const Mask m = mask_of(lanes >> k & kAllLanes);
-    Float open = splat(1.0f);
-    if (any(m)) {
-      const Vec3f p = load3(s.p, k), n = load3(s.n, k);
-      const Int own = load(hits.geom + k);
-      for (int i = 0; i < near.count; ++i) {
-        const Mask other = m & ~(own == int_of(near.list[i]));
+  for (int k = 0; k < kLanes; k += kWidth) store(out + k, splat(1.0f));
+  if (!lanes) return;
+  float center[3];
+  const float radius = sphere_around(s, lanes, center);
+  for (int first = 0; first < tile.count; first += kWidth) {
+    for (std::uint32_t near = boxes_near(tile.boxes, first, center, radius); near;
+         near &= near - 1) {
+      const int i = first + __builtin_ctz(near);
+      if (i >= tile.count) return;
+      const ViewGeom& g = view.geoms[tile.list[i]];
+      const float reach = hiding_reach(g, view.physical.occlusion_reach);
+      for (int k = 0; k < kLanes; k += kWidth) {
+        const Vec3f p = load3(s.p, k), n = load3(s.n, k);
+        // It is not wholly below the horizon of the surface.
+        const Mask over = g.type == mjGEOM_PLANE ? mask_of(kAllLanes)
+                                                 : splat(-g.radius) < dot(splat(g.center) - p, n);
+        const Mask other =
+            mask_of(lanes >> k & kAllLanes) & over & ~(load(hits.geom + k) == int_of(tile.list[i]));
         if (!any(other)) continue;
-        const ViewGeom& g = view.geoms[near.list[i]];
-        const float reach = reach_of(view, g);
-        if (!any(other & may_hide(g, p, n, reach))) continue;
-        const Float hidden = hidden_by(g, p, n, reach);
-        open = open * (splat(1.0f) - select(other, min(hidden, splat(1.0f)), splat(0.0f)));
+        const Float hidden = min(hidden_by(g, p, n, reach), splat(1.0f));
+        store(out + k, load(out + k) * (splat(1.0f) - select(other, hidden, splat(0.0f))));
       }
     }
-    store(out + k, open);
   }
 }
 

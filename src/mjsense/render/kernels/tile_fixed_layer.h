@@ -100,7 +100,7 @@ inline void find_all_casters(const View& view, const FixedTile* fixed, const Til
   const TileBounds all = bounds_of_tile(view, nullptr, tile, packets);
   if (receivers) include(all, *receivers);
   if (view.physical.occlusion_reach > 0)
-    find_occluders(view, Part::kAll, all.low, all.high, scratch.occluders, out.near);
+    find_occluders(view, Part::kAll, all.low, all.high, scratch, out.near);
   if (!view.shadows) return;
   if (fixed) {
     find_casters(view, Part::kFixed, bounds_of_tile(view, fixed, tile, packets), scratch, used,
@@ -133,7 +133,7 @@ inline void make_fixed(const View& view, int count, int packets, Tile& tile, Til
   Shadows shadows;
   const TileBounds bounds = bounds_of_tile(view, nullptr, tile, packets);
   if (view.physical.occlusion_reach > 0)
-    find_occluders(view, Part::kFixed, bounds.low, bounds.high, scratch.occluders, shadows.near);
+    find_occluders(view, Part::kFixed, bounds.low, bounds.high, scratch, shadows.near);
   if (view.shadows) {
     int used = 0, spare = scratch.max_caster_parts;
     find_casters(view, Part::kFixed, bounds, scratch, used, spare, shadows.fixed);

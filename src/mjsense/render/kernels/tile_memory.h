@@ -17,6 +17,7 @@ class TileMemory {
  private:
   std::vector<int> geoms_, casters_;
   std::vector<float> windows_;  // of casters
+  std::vector<float> boxes_;    // of occluders
   Array tile_;
   TileScratch scratch_;
 };

@@ -211,7 +211,7 @@ void ChangedTiles::mark_occlusion(const View& view) {
       const float away = std::max({box.low[i] - g->center[i], g->center[i] - box.high[i], 0.0f});
       square += away * away;
     }
-    const float reach = 1.001f * (g->radius + view.physical.occlusion_reach);
+    const float reach = 1.001f * (g->radius + hiding_reach(*g, view.physical.occlusion_reach));
     return square < reach * reach;
   };
   for (std::size_t tile = 0; tile < changed_.size(); ++tile) {

@@ -57,11 +57,15 @@ struct PhysicalView {
   bool operator==(const PhysicalView&) const = default;
 };
 
-// Spheres around the geoms that hide the environment, by geom, with kWindowPadding more entries that
-// kernels may read. A geom changes nothing outside its sphere. Camera frame, m; a negative radius: the
-// geom hides nothing.
-struct OccluderSpheres {
-  float *x = nullptr, *y = nullptr, *z = nullptr, *radius = nullptr;
+// Boxes around geoms, and the distance from its box up to which each hides the environment, m; negative:
+// it hides nothing. Rows of values by geom, with kWindowPadding more entries that kernels may read.
+struct OccluderBoxes {
+  // R_CB, row-major, -R_CB^T p_CB, half sizes and the distance; C is the camera's frame, B the box's.
+  static constexpr int kRotation = 0, kOrigin = 9, kHalf = 12, kReach = 15, kRows = 16;
+  float* values = nullptr;
+  std::size_t stride = 0;
+
+  float* row(int k) const { return values + k * stride; }
 };
 
 }  // namespace mjsense::render

@@ -15,7 +15,9 @@ struct TileScratch {
   int num_row_geoms = 0;
   int* opaque_geoms = nullptr;  // visible in the tile
   int* transparent_geoms = nullptr;
-  int* occluders = nullptr;  // geoms that may hide the environment from the tile
+  // Geoms that may hide the environment from the tile, and their boxes in this order.
+  int* occluders = nullptr;
+  OccluderBoxes occluder_boxes;
   // Shadow casters of all lights: kMaxLights entries for each geom, and max_caster_parts.
   int* casters = nullptr;
   LightWindows caster_windows{};

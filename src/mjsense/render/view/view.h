@@ -61,7 +61,7 @@ struct View {
   bool shadows = false;
   PhysicalView physical;
   WarpLight warp;
-  OccluderSpheres occluders;
+  OccluderBoxes occluders;
   bool layered = false;                    // fixed geoms are drawn first
   const FixedTile* fixed_tiles = nullptr;  // by tile: their cached image; null: not cached
   // By ViewGeom::id: index in `geoms`, for visible geoms. Null if the view is not layered.

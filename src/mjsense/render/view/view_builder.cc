@@ -564,14 +564,22 @@ void ViewBuilder::set_sky(const rays::RayGeom* plane, const Sky& sky, const doub
 }
 
 void ViewBuilder::set_occluders() {
+  using Boxes = OccluderBoxes;
   const std::size_t stride = sorted_.size() + kWindowPadding;
-  occluder_spheres_.resize(4 * stride);
-  float* p = occluder_spheres_.data();
-  view_.occluders = {p, p + stride, p + 2 * stride, p + 3 * stride};
+  occluder_boxes_.resize(Boxes::kRows * stride);
+  view_.occluders = {occluder_boxes_.data(), stride};
+  const auto set = [&](int row, int i, float value) { view_.occluders.row(row)[i] = value; };
   for (int i = 0; i < view_.num_geoms; ++i) {
     const ViewGeom& g = sorted_[i];
-    for (int k = 0; k < 3; ++k) p[k * stride + i] = g.type == mjGEOM_PLANE ? 0 : g.center[k];
-    p[3 * stride + i] = hides_environment(g) ? g.radius + view_.physical.occlusion_reach : -1;
+    const bool plane = g.type == mjGEOM_PLANE;
+    for (int k = 0; k < 9; ++k) set(Boxes::kRotation + k, i, g.rot[k]);
+    for (int k = 0; k < 3; ++k) {
+      const float side = k == 2 ? 0 : g.size[k] > 0 ? g.size[k] : kEndless;  // of a plane
+      set(Boxes::kOrigin + k, i, g.eye[k] - (plane ? 0 : g.aabb[k]));
+      set(Boxes::kHalf + k, i, plane ? side : g.aabb[3 + k]);
+    }
+    set(Boxes::kReach, i,
+        hides_environment(g) ? hiding_reach(g, view_.physical.occlusion_reach) : -kEndless);
   }
 }
 

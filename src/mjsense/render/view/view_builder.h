@@ -159,7 +159,7 @@ class ViewBuilder {
   std::vector<Order> order_;
   std::vector<std::uint64_t> candidates_;  // bit per object that may be visible
   LightSpace light_space_;
-  std::vector<float> occluder_spheres_;
+  std::vector<float> occluder_boxes_;
   std::vector<std::uint8_t> fixed_;  // per geom; empty if not layered
   std::vector<int> geom_index_;
   // By flex part, then by skin, with the world's normals.

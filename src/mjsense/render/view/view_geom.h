@@ -85,4 +85,9 @@ struct alignas(64) ViewGeom {
 // if its bounding box says little about its shape.
 bool hides_environment(const ViewGeom& geom);
 
+// Distance from the geom up to which it hides the environment, m; at most `reach`.
+inline float hiding_reach(const ViewGeom& geom, float reach) {
+  return 4 * geom.radius < reach ? 4 * geom.radius : reach;
+}
+
 }  // namespace mjsense::render
