@@ -2,6 +2,8 @@
 #pragma once
 // A geom of a view: its pose, shape and material in the camera's frame.
 
+#include <algorithm>
+
 #include "mjsense/render/view/surface_assets.h"
 #include "mjsense/render/view/texture_maps.h"
 
@@ -85,9 +87,13 @@ struct alignas(64) ViewGeom {
 // if its bounding box says little about its shape.
 bool hides_environment(const ViewGeom& geom);
 
-// Distance from the geom up to which it hides the environment, m; at most `reach`.
+// Distance from the geom up to which it hides the environment, m; at most `reach`. At the ends given here a
+// sphere hides 1 % of it, or less.
 inline float hiding_reach(const ViewGeom& geom, float reach) {
-  return 4 * geom.radius < reach ? 4 * geom.radius : reach;
+  const float* half = geom.aabb + 3;
+  const bool box = geom.type == mjGEOM_BOX || geom.type == mjGEOM_PLANE;
+  const float own = box ? 4 * geom.radius : 10 * std::min({half[0], half[1], half[2]});
+  return std::min(own, reach);
 }
 
 }  // namespace mjsense::render
