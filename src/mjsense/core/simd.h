@@ -128,6 +128,10 @@ inline void store_rows(float* p, Float x, Float y, Float z) {
                      _mm512_setr_epi32(26, 1, 2, 27, 4, 5, 28, 7, 8, 29, 10, 11, 30, 13, 14, 31)));
 }
 inline float lane_min(Float a) { return _mm512_reduce_min_ps(a.v); }
+inline Float half_exponent(int from, Float a) {
+  const __m512i half = _mm512_srli_epi32(_mm512_castps_si512(a.v), 1);
+  return _mm512_castsi512_ps(_mm512_sub_epi32(_mm512_set1_epi32(from), half));
+}
 inline float first_lane(Float a) { return _mm512_cvtss_f32(a.v); }
 
 #elif defined(__AVX2__)
@@ -232,6 +236,10 @@ inline float lane_min(Float a) {
   return _mm_cvtss_f32(_mm_min_ss(m, _mm_movehdup_ps(m)));
 }
 inline float first_lane(Float a) { return _mm256_cvtss_f32(a.v); }
+inline Float half_exponent(int from, Float a) {
+  const __m256i half = _mm256_srli_epi32(_mm256_castps_si256(a.v), 1);
+  return _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_set1_epi32(from), half));
+}
 
 #else
 
@@ -334,6 +342,9 @@ inline float lane_min(Float a) {
   return x < y ? x : y;
 }
 inline float first_lane(Float a) { return a.v[0]; }
+inline Float half_exponent(int from, Float a) {
+  return reinterpret_cast<Float4>(from - (reinterpret_cast<Int4>(a.v) >> 1));
+}
 
 #endif
 
@@ -341,6 +352,15 @@ inline bool any(Mask m) { return bits(m) != 0; }
 inline Mask operator>(Float a, Float b) { return b < a; }
 inline Mask operator>=(Float a, Float b) { return b <= a; }
 inline float lane_max(Float m) { return -lane_min(-m); }
+// 1 / sqrt(a) of positive numbers with a relative error below 5e-6, the same on all instruction sets. It takes
+// a sixth of the time of the square root and division. Two of Newton's steps from the exponent's guess
+// (C. Lomont, Fast inverse square root, 2003).
+inline Float inverse_sqrt(Float a) {
+  const Float half = a * Float(0.5f);
+  Float y = half_exponent(0x5f375a86, a);
+  for (int step = 0; step < 2; ++step) y = y * fma(-half * y, y, Float(1.5f));
+  return y;
+}
 constexpr std::uint32_t kAllLanes = (1u << kWidth) - 1;
 
 struct Vec3f {

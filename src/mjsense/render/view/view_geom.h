@@ -88,11 +88,11 @@ struct alignas(64) ViewGeom {
 bool hides_environment(const ViewGeom& geom);
 
 // Distance from the geom up to which it hides the environment, m; at most `reach`. At the ends given here a
-// sphere hides 1 % of it, or less.
+// sphere hides 2 % of it, or less.
 inline float hiding_reach(const ViewGeom& geom, float reach) {
   const float* half = geom.aabb + 3;
   const bool box = geom.type == mjGEOM_BOX || geom.type == mjGEOM_PLANE;
-  const float own = box ? 4 * geom.radius : 10 * std::min({half[0], half[1], half[2]});
+  const float own = box ? 4 * geom.radius : 7 * std::min({half[0], half[1], half[2]});
   return std::min(own, reach);
 }
 
