@@ -94,7 +94,10 @@ int has_exited(pid_t pid) {
 void kill_group(pid_t leader) {
   // The id belongs to the child and its group until the exit status is collected. If the system has
   // discarded the status, a process with this id is another one, and the group is empty.
-  if (has_exited(leader) >= 0 || (kill(leader, 0) != 0 && errno == ESRCH)) kill(-leader, SIGKILL);
+  const int exited = has_exited(leader);
+  // Emulators make vfork() a fork(), after which the child may not have its group yet.
+  if (exited == 0) kill(leader, SIGKILL);
+  if (exited >= 0 || (kill(leader, 0) != 0 && errno == ESRCH)) kill(-leader, SIGKILL);
 }
 
 // Ends the group of a child that has exited or was killed, and collects its exit status.
