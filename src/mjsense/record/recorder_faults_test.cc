@@ -78,7 +78,7 @@ TEST(RecorderFaults, FfmpegWritesAnIncompleteVideo) {
        "is not a complete video: it is neither MP4 nor Matroska"},
       {"cat > /dev/null", "does not exist"},
       {"cat > /dev/null; : > $out", "is not a complete video: it is empty"},
-      {"head -c 864 | ffmpeg \"$@\"", "has 3 frames, expected 6"},
+      {"head -c 864 | ffmpeg \"$@\"; cat > /dev/null", "has 3 frames, expected 6"},
       {"ffmpeg \"$@\"; head -c 700 $out > $out.x; mv $out.x $out", "the file is truncated"},
       {"ffmpeg -loglevel error -f rawvideo -pixel_format yuv420p -video_size 16x12 -i pipe:0 -c:v "
        "mpeg4 -y -f mp4 file:$out",
