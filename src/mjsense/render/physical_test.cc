@@ -143,5 +143,22 @@ TEST(Physical, WallHidesHalfOfTheSurroundings) {
   EXPECT_LT(corner, 0.68);
 }
 
+// A sphere of radius r whose centre is at the distance d above a surface hides r^2 / d^2 of the
+// surroundings, which the reach of 0.5 m lowers, and 7 r away nothing.
+TEST(Physical, SphereHidesWhatItCovers) {
+  TestRenderer s(std::string(kDark) +
+                 R"(<asset><material name="m" specular="0" rgba="0.2 0.2 0.2 1"/></asset><worldbody>
+    <geom type="plane" size="9 9 .1" material="m"/>
+    <geom type="sphere" size=".05" pos="0 0 .1"/><geom type="sphere" size=".1" pos="2 0 .2"/></worldbody>)");
+  s.options.physical = linear(8);
+  s.options.physical.occlusion_reach = 0;
+  const auto radiance = [&](double x) { return decoded(s.center({x, 0, 0.04}, kX, kY, 0.01)[0]); };
+  const double open = radiance(-3);
+  s.options.physical.occlusion_reach = 0.5f;
+  EXPECT_NEAR(radiance(0) / open, 1 - 0.25 * std::pow(1 - std::pow(0.05 / 0.35, 2), 2), 0.01);
+  EXPECT_NEAR(radiance(2) / open, 1 - 0.25 * std::pow(1 - std::pow(0.1 / 0.5, 2), 2), 0.01);
+  EXPECT_EQ(radiance(-0.41), open);
+}
+
 }  // namespace
 }  // namespace mjsense::render
