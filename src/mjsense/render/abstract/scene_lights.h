@@ -2,6 +2,7 @@
 #pragma once
 // The lights of an abstract scene.
 
+#include <utility>
 #include <vector>
 
 #include "mjsense/render/abstract/abstract_scene.h"

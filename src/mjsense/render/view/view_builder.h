@@ -5,6 +5,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>

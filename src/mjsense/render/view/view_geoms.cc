@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/render/view/view_geoms.h"
 
+#include <algorithm>
+
+#include "mjsense/render/view/light_frame.h"
+
 namespace mjsense::render {
 
 bool hides_environment(const ViewGeom& g) {

@@ -2,7 +2,8 @@
 #pragma once
 // The geoms of a view, in the order in which they are drawn.
 
-#include <algorithm>
+#include <mujoco/mujoco.h>
+
 #include <cmath>
 #include <cstddef>
 #include <vector>

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+// What the views of a camera show, for all its images.
 
 #include <cstddef>
 
