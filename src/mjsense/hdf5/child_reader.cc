@@ -156,7 +156,7 @@ std::string in_child(std::string_view what, std::uint64_t file_bytes,
   {
     const H5Lock lock;  // so that no other thread is inside the library during the fork
     const SignalsBlocked blocked;
-    pid = fork();
+    pid = fork();  // not posix_spawn(): `read` is a function of this process, not a program
     if (pid == 0) {
       out.reset();
       H5Lock::alone();

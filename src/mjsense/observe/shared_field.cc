@@ -5,13 +5,6 @@
 #include "mjsense/core/named.h"
 
 namespace mjsense::observe {
-namespace {
-
-Stage stage_after(const Sensor& source) {
-  return source.stage() == Stage::kRow ? Stage::kRow : Stage::kPostCast;
-}
-
-}  // namespace
 
 SharedField::SharedField(std::string name, Sensor& source, std::string field,
                          std::function<void(SensorSpec&)> adapt)
@@ -20,16 +13,16 @@ SharedField::SharedField(std::string name, Sensor& source, std::string field,
       field_(std::move(field)),
       adapt_(std::move(adapt)) {}
 
-Stage SharedField::stage() const { return stage_after(*source_); }
-Stage SharedSensor::stage() const { return stage_after(*source_); }
-
-void SharedSensor::initialize(const SensorInit& /*init*/) {
-  clear_fields();
-  for (Field& field : source_->fields()) share_field(field.name, field.spec, field);
+Stage SharedField::stage() const {
+  return source_->stage() == Stage::kRow ? Stage::kRow : Stage::kPostCast;
 }
 
 void SharedField::initialize(const SensorInit& /*init*/) {
   clear_fields();
+  if (field_.empty()) {
+    for (Field& field : source_->fields()) share_field(field.name, field.spec, field);
+    return;
+  }
   const std::string context = "sensor '" + name() + "', which shows '" + source_->name() + "'";
   Field& field = find_named(source_->fields(), &Field::name, field_, context, "field");
   SensorSpec spec = field.spec;

@@ -89,6 +89,11 @@ TEST(SharedField, SharesMemoryUnderAnotherNameAndShape) {
   EXPECT_EQ(depth.fields()[0].data.shape(), Shape({2, 2, 3}));
   camera.fields()[0].data.row<float>(1)[4] = 7;
   EXPECT_EQ(depth.fields()[0].data.row<float>(1)[4], 7);
+  SharedField all("copy", camera);
+  all.initialize(w.init(2));
+  ASSERT_EQ(all.fields().size(), camera.fields().size());
+  EXPECT_EQ(all.fields()[0].name, "depth");
+  EXPECT_EQ(all.fields()[0].data.row<float>(1)[4], 7);
 
   SharedField wrong("wrist_depth", camera, "dept");
   EXPECT_EQ(

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Starts another program. posix_spawn() would suffice except for one case: a signal that was sent
-// to the whole process group of this process (Ctrl-C, the end of a job) while the child still
-// belonged to that group would reach the program as soon as it runs.
+// Starts another program. posix_spawn() cannot do it: it sets no resource limits, and limits that the
+// parent sets afterwards (prlimit()) come when the program runs already. And a signal that was sent to the
+// whole process group of this process (Ctrl-C, the end of a job) while the child still belonged to that
+// group would reach the program as soon as it runs.
 
 #include <sys/types.h>
 

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "mjsense/render/kernels/shading.h"
-#include "mjsense/render/view/view_builder.h"
+#include "mjsense/render/view/geom_surface.h"
 
 namespace mjsense::render {
 namespace {

@@ -9,24 +9,20 @@
 
 #include <mujoco/mujoco.h>
 
-#include <cstddef>
 #include <cstdint>
-#include <limits>
-#include <map>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "mjsense/core/array.h"
+#include "mjsense/worlds/foreign_contacts.h"
+#include "mjsense/worlds/foreign_data.h"
+#include "mjsense/worlds/foreign_model.h"
 #include "mjsense/worlds/scratch_data.h"
 #include "mjsense/worlds/worlds.h"
 
 namespace mjsense::worlds {
-
-// MuJoCo's function that is called for each world. kPositions: those that compute what follows from
-// positions, without collisions.
-enum class RawCall { kStep, kForward, kStep1, kStep2, kReset, kPositions };
 
 class ForeignArrays {
  public:
@@ -73,77 +69,22 @@ class ForeignArrays {
   void take_poses();
 
  private:
-  struct Field {
-    DType type, dtype;  // of mjData, of the program
-    int count;          // elements of a row
-    bool constraints;   // there are nefc elements
-    bool input, reset;  // written by the program; shown by a reset
-    bool control;       // positions and velocities do not depend on it
-    bool contact_ids;   // of contacts among those of all worlds
-    bool solved;        // of constraints: a result of the solver
-    bool poses;         // of geoms, cameras or lights
-    bool positions;     // follows from positions, without collisions
-    const void* (*pointer)(const mjData*);
-    std::byte* rows;
-    std::size_t row_bytes;        // distance of two rows
-    std::vector<std::byte> seen;  // [B, count], what was written last; of inputs
-  };
-  struct ModelField {
-    std::string name;
-    DType type, dtype;
-    int count, num_rows;  // at most one for each world
-    bool constants;       // MuJoCo derives others from it
-    const std::byte* rows;
-    std::size_t row_bytes;
-    std::vector<std::byte> seen;  // [num_rows, count]
-  };
-  struct ContactField {
-    int made;            // which of the fields that mjContact does not have; -1: one that it has
-    std::size_t offset;  // in mjContact
-    DType dtype;
-    int count;
-    std::byte* rows;
-    std::size_t row_bytes;
-  };
-
   static void run_world(const mjModel* m, mjData* d, int w, void* argument);
-  bool take(mjData* d, int w);
-  void take_shown(mjData* d, int w, bool poses_only) const;
   void step_in_scratch(const mjModel* m, mjData* d, int w);
   void compute_positions(const mjModel* m, mjData* d, int w);
-  void show_model(ModelField& field);
   void show(const mjData* d, int w);
   void show_diverged(const mjModel* m, mjData* d, int w);
-  void show_contacts(const mjModel* m, int w);
-  void number_contacts();
   void fill_scratch();
-  struct Written {
-    std::byte* place;
-    std::vector<std::byte> before;
-  };
-  void take_model();
-  bool write_model(std::vector<Written>& written, std::vector<int>& derive);
-  void derive(const std::vector<int>& ids, std::span<const std::string> released);
   void apply(mjfBatchFunc function);
-  void check_capacity() const;
 
   Worlds worlds_;
-  std::vector<Field> fields_;
-  std::vector<ModelField> model_fields_;
-  std::vector<ContactField> contact_fields_;
-  // Of the program's data, and rows of the arrays.
-  int max_contacts_ = std::numeric_limits<int>::max();
-  int max_constraints_ = std::numeric_limits<int>::max();
-  // By world: its contacts, the number of its constraints, the first of them of a contact, the row of
-  // its first contact in the arrays, and that row when efc_id was written.
-  std::vector<std::vector<mjContact>> contacts_;
-  std::vector<int> num_constraints_, first_contact_row_, first_contact_, written_first_contact_;
+  ForeignData data_;
+  ForeignModel model_;
+  ForeignContacts contacts_;
   ScratchData scratch_;
   std::vector<mjData*> borrowed_;  // by world; not null after a MuJoCo error
   // By world: positions and velocities are those of the state, so that a step need not compute them.
   std::vector<std::uint8_t> current_;
-  // By the fields of set_constants(), by world: it has derived them since the model changed.
-  std::map<std::vector<std::string>, std::vector<std::uint8_t>> derived_;
   std::vector<std::uint8_t> scratched_;  // by world: its mjData has only the state of the last step
   RawCall call_ = RawCall::kStep;
   const bool* mask_ = nullptr;

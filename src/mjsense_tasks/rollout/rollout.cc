@@ -209,8 +209,8 @@ void Rollout::make() {
 std::vector<std::shared_ptr<Sensor>> Rollout::robot_sensors() {
   std::vector<std::shared_ptr<Sensor>> sensors;
   for (const auto& cfg : task_->cfg().robot.sensors) {
-    sensors.push_back(std::make_shared<observe::SharedSensor>(
-        cfg->name, simulation_->scene().sensor(cfg->key())));
+    sensors.push_back(
+        std::make_shared<observe::SharedField>(cfg->name, simulation_->scene().sensor(cfg->key())));
   }
   if (cfg_.robot_sensors) {
     for (auto& sensor : cfg_.robot_sensors(*this)) sensors.push_back(std::move(sensor));

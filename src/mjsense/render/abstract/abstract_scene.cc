@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "mjsense/core/error.h"
@@ -64,6 +66,10 @@ StructReader StructReader::cameras(const StructLayout& layout) {
 }
 
 #undef MJSENSE_FIELD
+
+bool is_finite(std::span<const float> values) {
+  return std::ranges::all_of(values, [](float x) { return std::isfinite(x); });
+}
 
 StructReader::StructReader(const char* type, const StructLayout& layout,
                            std::span<const Wanted> fields) {

@@ -41,6 +41,9 @@ struct AbstractCamera {
   int orthographic = 0;
 };
 
+// Whether all values are finite.
+bool is_finite(std::span<const float> values);
+
 // Place of a field in a struct of the library: bytes from the struct's reference address, and its
 // size in bytes.
 struct FieldPlace {

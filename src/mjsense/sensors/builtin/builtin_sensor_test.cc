@@ -18,7 +18,7 @@
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/model_sensors/builtin_types.h"
 #include "mjsense/scene/scene.h"
-#include "mjsense/sensors/builtin/builtin_cases.h"
+#include "mjsense/sensors/builtin/testing/builtin_cases.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense::sensors {

@@ -79,6 +79,8 @@ class CameraSensor final : public Sensor {
   void expose(const CastContext& context);
   // Renders images of these worlds at instant_.
   void render_images(const CastContext& context, std::span<const int> images);
+  void render_whole(const CastContext& context, std::span<const int> images, int tile_rows);
+  void render_in_bands(const CastContext& context, std::span<const int> images, int tile_rows);
   void add_noise(const CastContext& context);
   void develop(const CastContext& context);
   render::PixelGrid grid_in(const mjModel* model) const;

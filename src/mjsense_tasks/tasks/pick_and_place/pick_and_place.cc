@@ -11,6 +11,8 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/model_geometry.h"
 #include "mjsense_tasks/scenes/object_references.h"
+#include "mjsense_tasks/tasks/pick_and_place/places.h"
+#include "mjsense_tasks/tasks/pick_and_place/placing_sentences.h"
 #include "mjsense_tasks/tasks/pick_and_place/support_check.h"
 
 namespace mjsense::tasks {
@@ -26,38 +28,6 @@ constexpr double kBeside = 0.05 + 0.01;              // m, maximum horizontal ga
 constexpr double kSamePlace = 0.005,
                  kSameTurn = 10 * pi / 180;  // m, rad, tolerance of a pose carried forward
 constexpr double kSameHeight = 0.01;  // m, tolerance of underside heights without contact forces
-constexpr double kBesideGap = 0.03;   // m, gap that a planner aims at if no drawn place is free
-constexpr double kMinGap = 0.02, kMaxGap = 0.04;  // m, of the drawn places next to an object
-constexpr double kAlong = 0.5;  // drawn shift along the other object, as a share of its half size
-constexpr double kAround = 0.012;  // m, radius of surface points considered for a placement
-// Drawn places, at most, and how many points of the receptacle are drawn for them.
-constexpr int kMaxPlaces = 8, kMaxDraws = 32;
-constexpr double kUneven = 0.008;  // m, maximum difference in height below an object
-constexpr double kCell = 0.008;    // m, twice the distance of the surface points
-constexpr int kMaxCells = 6;       // along each side of an object
-
-// {0}: the object, {1}: where it is put ("next to the plate"), {2}: where it is moved to ("into the
-// box").
-constexpr std::array<const char*, 14> kPlacingSentences{
-    "Pick up {0} and place it {1}",
-    "Put {0} {1}",
-    "Place {0} {1}",
-    "Move {0} {2}",
-    "Take {0} and put it {1}",
-    "Grab {0} and set it down {1}",
-    "Lift {0} and put it {1}",
-    "Bring {0} over and set it down {1}",
-    "Please put {0} {1}",
-    "Can you put {0} {1}?",
-    "Could you place {0} {1}, please?",
-    "I want {0} to be {1}",
-    "Pick up {0}, then put it {1}",
-    "Please move {0} {2}",
-};
-// Receptacles by the last word of their names: things are put in them or on them.
-constexpr std::array<std::string_view, 10> kInside{"bowl", "box", "basket", "pan", "pot",
-                                                   "cup",  "mug", "bin",    "jar", "crate"};
-constexpr std::array<std::string_view, 5> kOnTop{"plate", "tray", "board", "coaster", "book"};
 
 // Name of receptacles that differ only in color, such as "bowl".
 const std::string& noun(const scenes::SceneObject& object) {
@@ -284,112 +254,17 @@ episode::Evaluation PickAndPlaceTask::evaluate(const World& world) const {
   return make_evaluation_from(world.id, std::exp(-now.position_error), now.missing);
 }
 
-// Random numbers of the places of an episode: they depend on seed and episode only.
-Rng PickAndPlaceTask::place_rng(int world) const {
-  return {cfg().seed, 0, stream_of("task/place"), static_cast<std::uint64_t>(episode(world))};
-}
-
 void PickAndPlaceTask::places(const World& world, const Quat& turn, std::vector<Vec3>& out) const {
+  const Episode& episode = episodes_[world.id];
+  // They depend on seed and episode only.
+  const Rng rng(cfg().seed, 0, stream_of("task/place"),
+                static_cast<std::uint64_t>(this->episode(world.id)));
+  const PlaceQuery query{world, episode.objects[0].body, episode.objects[1].body, turn, rng};
   if (kind_ == PlaceKind::kNextTo) {
-    places_beside(world, turn, out);
+    places_beside(query, robot().base_body(), out);
   } else {
-    places_within(world, turn, out);
+    places_within(query, shape(world.id, episode.receptacle).points, out);
   }
-}
-
-// Drawn places first: a random side, gap and shift along the side. Then those nearest to the robot.
-void PickAndPlaceTask::places_beside(const World& world, const Quat& turn,
-                                     std::vector<Vec3>& out) const {
-  const Episode& episode = episodes_[world.id];
-  const int body = episode.objects[1].body;
-  const Aabb box = world_box(world, body);
-  const Vec3 c = box.center(), half_other = 0.5 * box.size();
-  const Vec3 half = 0.5 * turned_box(world, episode.objects[0].body, turn).size();
-  const Vec3 both = half + half_other;
-  Rng draw = place_rng(world.id);
-  for (int k = 0; k < kMaxPlaces; ++k) {
-    const bool of_x = draw.below(2) == 0;
-    const double gap = draw.uniform(kMinGap, kMaxGap), side = draw.below(2) == 0 ? 1 : -1;
-    const double along = draw.uniform(-kAlong, kAlong);
-    out.push_back(of_x ? Vec3{c.x + side * (both.x + gap), c.y + along * half_other.y, box.low.z}
-                       : Vec3{c.x + along * half_other.x, c.y + side * (both.y + gap), box.low.z});
-  }
-  const double x = both.x + kBesideGap, y = both.y + kBesideGap;
-  for (double along : {0.0, 0.02, -0.02}) {
-    for (int side = -1; side <= 1; side += 2) {
-      out.push_back({c.x + along, c.y + side * y, box.low.z});
-      out.push_back({c.x + side * x, c.y + along, box.low.z});
-    }
-  }
-  const Vec3 base = vec3(world.data->xpos + 3 * robot().base_body());
-  std::stable_sort(out.begin() + kMaxPlaces, out.end(), [&](Vec3 a, Vec3 b) {
-    return std::hypot(a.x - base.x, a.y - base.y) < std::hypot(b.x - base.x, b.y - base.y);
-  });
-  // Remove placements beyond the edge of the supporting surface, such as on the robot's pedestal
-  // next to the table: there the two objects would not be on the same surface.
-  const int carrier = supporting_body(world, body);
-  std::erase_if(out, [&](Vec3 p) {
-    return carrier >= 0 &&
-           !is_supported_over_whole_area(world, p, half, carrier, episode.objects[0].body);
-  });
-}
-
-// Drawn places first: points uniformly distributed over the receptacle at which the object fits.
-// Then its middle, points around it, and its rim.
-void PickAndPlaceTask::places_within(const World& world, const Quat& turn,
-                                     std::vector<Vec3>& out) const {
-  const Episode& episode = episodes_[world.id];
-  const int body = episode.objects[1].body;
-  const Aabb box = world_box(world, body);
-  const Vec3 c = box.center();
-  // The height is that of the receptacle's surface: its bottom if it is open, otherwise its rim.
-  const Pose pose = body_pose(world.data, body);
-  std::vector<Vec3> points;
-  for (Vec3 point : shape(world.id, episode.receptacle).points) points.push_back(pose * point);
-  const auto surface = [&](double x, double y) {
-    double top = -std::numeric_limits<double>::infinity();
-    for (Vec3 p : points) {
-      // The first comparison skips distant points early. A plan evaluates this thousands of times.
-      const double dx = p.x - x, dy = p.y - y;
-      if (std::abs(dx) < kAround && dx * dx + dy * dy < kAround * kAround) top = std::max(top, p.z);
-    }
-    return top;
-  };
-  const Vec3 half = 0.5 * turned_box(world, episode.objects[0].body, turn).size();
-  // Height at which the object rests at (x, y); NaN if not all of the surface below its box is level,
-  // such as on a rim. The box is divided into cells, in each of which the surface has points.
-  const int nx = std::clamp(static_cast<int>(2 * half.x / kCell), 1, kMaxCells);
-  const int ny = std::clamp(static_cast<int>(2 * half.y / kCell), 1, kMaxCells);
-  const auto rest = [&](double x, double y) {
-    std::array<double, kMaxCells * kMaxCells> tops;
-    tops.fill(-std::numeric_limits<double>::infinity());
-    double top = tops[0];
-    for (Vec3 p : points) {
-      const double dx = p.x - x, dy = p.y - y;
-      if (!(std::abs(dx) < half.x && std::abs(dy) < half.y)) continue;
-      const int i = static_cast<int>(0.5 * (dx / half.x + 1) * nx);
-      const int j = static_cast<int>(0.5 * (dy / half.y + 1) * ny);
-      double& of_cell = tops[std::min(i, nx - 1) * ny + std::min(j, ny - 1)];
-      of_cell = std::max(of_cell, p.z);
-      top = std::max(top, p.z);
-    }
-    const double low = *std::min_element(tops.begin(), tops.begin() + nx * ny);
-    return top - low <= kUneven ? top : std::numeric_limits<double>::quiet_NaN();
-  };
-  Rng draw = place_rng(world.id);
-  for (int k = 0; k < kMaxDraws && static_cast<int>(out.size()) < kMaxPlaces; ++k) {
-    const double x = draw.uniform(box.low.x, box.high.x), y = draw.uniform(box.low.y, box.high.y);
-    const double z = rest(x, y);
-    if (std::isfinite(z)) out.push_back({x, y, z});
-  }
-  for (double radius : {0.0, 0.02, 0.04}) {
-    for (int k = 0; k < (radius > 0 ? 6 : 1); ++k) {
-      const double x = c.x + radius * std::cos(k * pi / 3), y = c.y + radius * std::sin(k * pi / 3);
-      const double z = surface(x, y);
-      if (std::isfinite(z)) out.push_back({x, y, z});
-    }
-  }
-  out.push_back({c.x, c.y, box.high.z});
 }
 
 std::string PickAndPlaceTask::place_description(int world) const {
@@ -426,19 +301,8 @@ std::string PickAndPlaceTask::paraphrase(const World& world, Rng& rng) const {
   const std::string where =
       kind_ == PlaceKind::kColor ? "the " + place_description(world.id) : drawn(both[1]);
   if (object.empty() || where.empty()) return "";
-  const auto is_any = [name = std::string_view(scene().objects()[both[1]].text)](const auto& of) {
-    return std::ranges::any_of(of, [&](auto word) { return scenes::may_be_called(name, word); });
-  };
-  std::string at = "in or on ", to = "in or on ";
-  if (kind_ == PlaceKind::kNextTo) {
-    at = to = "next to ";
-  } else if (kind_ == PlaceKind::kPacking || is_any(kInside)) {
-    at = "in ", to = "into ";
-  } else if (is_any(kOnTop)) {
-    at = "on ", to = "onto ";
-  }
-  const char* sentence = kPlacingSentences[sentence_index(world.id, kPlacingSentences.size())];
-  return fmt::format(fmt::runtime(sentence), object, at + where, to + where);
+  return placing_sentence(sentence_index(world.id, num_placing_sentences()), kind_, object, where,
+                          scene().objects()[both[1]]);
 }
 
 episode::Task::Referrals::value_type PickAndPlaceTask::referral(const char* key, int index) const {

@@ -11,12 +11,9 @@
 #include "mjsense_tasks/episode/grasp_scene.h"
 #include "mjsense_tasks/scenes/base_placement_search.h"
 #include "mjsense_tasks/scenes/scene_task.h"
+#include "mjsense_tasks/tasks/pick_and_place/place_kind.h"
 
 namespace mjsense::tasks {
-
-// kInOrOn: any receptacle. kNextTo: next to any object. kColor: the receptacle of the given color
-// among several of one kind. kPacking: into a box.
-enum class PlaceKind { kInOrOn, kNextTo, kColor, kPacking };
 
 class PickAndPlaceTask final : public scenes::SceneTask,
                                public episode::GraspScene,
@@ -99,9 +96,6 @@ class PickAndPlaceTask final : public scenes::SceneTask,
   std::string_view missing_beside(const World& world, const Assessment& now) const;
   void set_objects(int world, int target, int receptacle);
   std::vector<int> choose(int world, Rng& rng) const;
-  Rng place_rng(int world) const;
-  void places_beside(const World& world, const Quat& turn, std::vector<Vec3>& out) const;
-  void places_within(const World& world, const Quat& turn, std::vector<Vec3>& out) const;
   std::string place_description(int world) const;
   Referrals::value_type referral(const char* key, int object) const;
 

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mjsense/render/view/view_geoms.h"
+
+#include <algorithm>
+
+#include "mjsense/render/view/light_frame.h"
+
+namespace mjsense::render {
+
+bool hides_environment(const ViewGeom& g) {
+  return g.casts_shadows && !g.transparent && !g.deforms && !g.height_field;
+}
+
+void set_primitive(int type, int object, int object_id, ViewGeom& g) {
+  g.type = type;
+  g.shows_back = type == mjGEOM_PLANE && g.eye[2] < 0;
+  g.object_type = object;
+  g.object_id = object_id;
+  g.bvh = nullptr;
+  g.clusters = nullptr;
+  g.horizons = nullptr;
+  g.mesh = nullptr;
+  g.mesh_on_demand = nullptr;
+  g.height_field = nullptr;
+  g.deforms = false;
+}
+
+ViewGeoms::ViewGeoms(std::size_t capacity) : unsorted_(capacity), sorted_(capacity) {
+  order_.reserve(capacity);
+}
+
+void ViewGeoms::sort(View& view) {
+  std::sort(order_.begin(), order_.end(), [](const Order& a, const Order& b) {
+    if (a.rank != b.rank) return a.rank < b.rank;
+    if (a.key != b.key) return a.key < b.key;
+    return a.index < b.index;
+  });
+  view.num_opaque = view.num_transparent = 0;
+  for (std::size_t i = 0; i < order_.size(); ++i) {
+    sorted_[i] = unsorted_[order_[i].index];
+    view.num_opaque += order_[i].rank == 0;
+    view.num_transparent += order_[i].rank == 1;
+  }
+  view.geoms = sorted_.data();
+  view.num_geoms = static_cast<int>(order_.size());
+}
+
+void ViewGeoms::set_occluders(View& view) {
+  using Boxes = OccluderBoxes;
+  const std::size_t stride = sorted_.size() + kWindowPadding;
+  occluder_boxes_.resize(Boxes::kRows * stride);
+  view.occluders = {occluder_boxes_.data(), stride};
+  const auto set = [&](int row, int i, float value) { view.occluders.row(row)[i] = value; };
+  for (int i = 0; i < view.num_geoms; ++i) {
+    const ViewGeom& g = sorted_[i];
+    const bool plane = g.type == mjGEOM_PLANE;
+    for (int k = 0; k < 9; ++k) set(Boxes::kRotation + k, i, g.rot[k]);
+    for (int k = 0; k < 3; ++k) {
+      const float side = k == 2 ? 0 : g.size[k] > 0 ? g.size[k] : kEndless;  // of a plane
+      set(Boxes::kOrigin + k, i, g.eye[k] - (plane ? 0 : g.aabb[k]));
+      set(Boxes::kHalf + k, i, plane ? side : g.aabb[3 + k]);
+    }
+    set(Boxes::kReach, i,
+        hides_environment(g) ? hiding_reach(g, view.physical.occlusion_reach) : -kEndless);
+  }
+}
+
+}  // namespace mjsense::render
