@@ -3,6 +3,7 @@
 
 import importlib.util
 import sys
+import types
 from pathlib import Path
 
 # Under a name of its own: other folders of tests have a run.py too.
@@ -52,3 +53,15 @@ def test_a_seed_draws_the_same_mutants():
     draw = mutation.module("draw").draw
     rooms = ["core", "python/dataset"]
     assert draw(mutation.ROOT, rooms, 20, 7) == draw(mutation.ROOT, rooms, 20, 7) != draw(mutation.ROOT, rooms, 20, 8)
+
+
+def test_a_probe_is_at_the_start_of_the_innermost_function(monkeypatch):
+    text = 'def outer(x):\n    """Text."""\n    def inner():\n        return (\n            1)\n    if x:\n        return inner()\n    return 2'
+    mutants = [mutation.Mutant("in inner", "x.py", "", 5, "", ""), mutation.Mutant("in outer", "x.py", "", 8, "", "")]
+    entered = []
+    monkeypatch.setitem(sys.modules, "mutation_probe", types.SimpleNamespace(entered=entered.append))
+    variables = {}
+    exec(mutation.module("judge_python").with_probes(text, mutants), variables)
+    assert (variables["outer"](0), entered) == (2, ["in outer"])
+    assert (variables["outer"](1), entered) == (1, ["in outer", "in outer", "in inner"])
+    assert variables["outer"].__doc__ == "Text."
