@@ -63,6 +63,7 @@ def test_properties_and_defaults():
     assert (renderer.height, renderer.width, renderer.model) == (240, 320, model)
     assert isinstance(renderer.scene, mujoco.MjvScene)
     assert renderer.scene.maxgeom == 10000
+    assert (renderer.shading, renderer.environment, renderer.samples_per_pixel) == ("classic", "model", 64)
     renderer.update_scene(data)
     image = renderer.render()
     assert image.shape == (240, 320, 3)

@@ -19,7 +19,7 @@ from scenes import BALL
 
 import mjsense as mjs
 from mjsense.core.rotations import rotation_of
-from mjsense.viewer import curves, geometry, surfaces
+from mjsense.viewer import curves, geometry, layer, surfaces
 from mjsense.viewer.poses import PoseStream
 
 needs_viser = pytest.mark.skipif(importlib.util.find_spec("viser") is None, reason="viser is not installed: pip install 'mjsense[view]'")
@@ -94,6 +94,18 @@ def test_textures_of_boxes():
     normals = surface.shape.normals[surface.shape.faces].mean(1)
     expected = [list(faces.values()).index(tuple(map(int, n.round()))) for n in normals]
     assert rows.tolist() == expected
+
+
+def test_a_texture_with_zero_repetitions_is_shown_once():
+    """As in MuJoCo's images."""
+    def shown(repeat):
+        model = mujoco.MjModel.from_xml_string(f"""<mujoco><asset><texture name="t" type="2d" builtin="checker" width="8" height="8"/>
+            <material name="m" texture="t" texrepeat="{repeat}"/></asset>
+            <worldbody><geom type="plane" size="1 2 1" material="m"/></worldbody></mujoco>""")
+        return surfaces.of_geom(model, 0, 1.0).shape.uv
+
+    np.testing.assert_array_equal(shown("0 0"), shown("1 1"))
+    np.testing.assert_array_equal(shown("3 0"), shown("3 1"))
 
 
 def test_poses_in_frames_of_bodies():
@@ -206,7 +218,16 @@ def test_controls_shapes_and_curves(live):
     assert len(live._curves._history["qpos"]) >= 5
     names = {m.name for m in messages(live).values() if hasattr(m, "name")}
     assert {"/shapes/sphere", "/shapes/arrow"} <= names
+    balls = next(m.props for m in messages(live).values() if getattr(m, "name", "") == "/shapes/sphere")
+    assert not balls.cast_shadow and not balls.receive_shadow
     live._source.set_joint(0, 0, 0.1) if live._source.joints() else None
+
+
+def test_a_cylinder_lies_along_its_vector():
+    for vector in ((0, 0, 2), (0, 0, -2), (1, 0, 0), (0.3, -0.4, 1.2)):
+        turned = rotation_of(layer._turn(np.array(vector, float)))[:, 2]
+        np.testing.assert_allclose(turned, np.array(vector) / np.linalg.norm(vector), atol=1e-9)
+    np.testing.assert_array_equal(layer._turn(np.zeros(3)), (1, 0, 0, 0))
 
 
 @needs_viser
