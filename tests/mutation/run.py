@@ -179,10 +179,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the draw (%(default)s)")
     parser.add_argument("--part", default="1/1", help="1/2 is every second mutant; each part is run in a checkout of its own")
     parser.add_argument("--report", action="store_true", help="only the figures so far")
-    parser.add_argument("--again", action="store_true", help="judge the survivors of Python again, with the tests as they are now")
     parser.add_argument("--package", type=Path, default=ROOT / "build/dev/python/mjsense",
                         help="package with the compiled module, for mutants of Python (%(default)s)")
-    parser.add_argument("--pytests", nargs="+", help="test files that may judge mutants of Python, those to be recorded first at the front")
+    parser.add_argument("--pytests", nargs="+", help="test files that judge mutants of Python, in this order; all if not given")
     parser.add_argument("--prefix", default="nice -n 10", help="before every build and test (%(default)s)")
     parser.add_argument("--limit", type=float, default=LIMIT_S, help="seconds of a test program; one that takes longer has noticed (%(default)s)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="of a build (%(default)s)")
@@ -200,7 +199,9 @@ def main() -> int:
             judging_python = module("judge_python")
             judging_python.link_package(TREE, WORK / "package", options.package.resolve())
             files = options.pytests or [str(f.relative_to(ROOT)) for f in sorted((ROOT / "tests/python").glob("test_*.py"))]
-            judging_python.judge_all(judging_python.Judge(runner, TREE, WORK / "package", WORK, files), python, RESULTS, TREE, options.again)
+            found = judging_python.Judge(options.prefix.split(), TREE, WORK / "package", WORK).judge(python, files)
+            known = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+            RESULTS.write_text(json.dumps(known | found, indent=1))
         if others := [mutant for mutant in mine if mutant.room not in PYTHON]:
             runner.configure()
             judge = judging.Judge(runner, ROOT, BUILD, ROOMS, QUICK_PYTESTS)

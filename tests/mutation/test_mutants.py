@@ -3,7 +3,6 @@
 
 import importlib.util
 import sys
-import types
 from pathlib import Path
 
 # Under a name of its own: other folders of tests have a run.py too.
@@ -55,13 +54,12 @@ def test_a_seed_draws_the_same_mutants():
     assert draw(mutation.ROOT, rooms, 20, 7) == draw(mutation.ROOT, rooms, 20, 7) != draw(mutation.ROOT, rooms, 20, 8)
 
 
-def test_a_probe_is_at_the_start_of_the_innermost_function(monkeypatch):
-    text = 'def outer(x):\n    """Text."""\n    def inner():\n        return (\n            1)\n    if x:\n        return inner()\n    return 2'
-    mutants = [mutation.Mutant("in inner", "x.py", "", 5, "", ""), mutation.Mutant("in outer", "x.py", "", 8, "", "")]
-    entered = []
-    monkeypatch.setitem(sys.modules, "mutation_probe", types.SimpleNamespace(entered=entered.append))
+def test_the_code_of_a_mutant_replaces_that_of_its_function():
+    text = "def outer(x):\n    def inner():\n        return 1\n    return inner() if x else 2\n"
+    forked, code = mutation.module("forked"), compile(text, "x.py", "exec")
+    assert [forked.inner(code, line).co_name for line in (3, 4)] == ["inner", "outer"]
     variables = {}
-    exec(mutation.module("judge_python").with_probes(text, mutants), variables)
-    assert (variables["outer"](0), entered) == (2, ["in outer"])
-    assert (variables["outer"](1), entered) == (1, ["in outer", "in outer", "in inner"])
-    assert variables["outer"].__doc__ == "Text."
+    exec(code, variables)
+    mutated = compile(text.replace("return 1", "return 7"), "x.py", "exec")
+    variables["outer"].__code__ = forked.named(mutated, variables["outer"].__code__)
+    assert (variables["outer"](1), variables["outer"](0)) == (7, 2)
