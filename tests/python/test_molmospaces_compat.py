@@ -200,6 +200,26 @@ def test_a_policy_with_a_model_plays_the_same_in_any_number_of_worlds(tmp_path, 
         np.testing.assert_array_equal(mine.states, other)
 
 
+class Half(Foreign):
+    """Commands the arm in some worlds, and the gripper in all."""
+
+    def __init__(self, worlds):
+        super().__init__()
+        self.worlds = worlds
+
+    def get_action(self, observation):
+        action = super().get_action(observation)
+        return action if self.task._world in self.worlds else {"gripper": action["gripper"]}
+
+
+def test_worlds_without_a_command_hold_a_group_that_others_command(tmp_path):
+    one, none = (
+        [e.states for e in mjs.evaluate("pick", policy=Half(worlds), out=tmp_path / f"{len(worlds)}", num_worlds=2, **INFERRED | {"episodes": 2}).dataset.episodes]
+        for worlds in ((0,), ()))  # fmt: skip
+    assert not np.array_equal(one[0], none[0])
+    np.testing.assert_array_equal(one[1], none[1])
+
+
 INFERRED = {"episodes": 3, "horizon": 6, "cameras": [], "progress": False}
 
 

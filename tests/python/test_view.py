@@ -19,7 +19,7 @@ from scenes import BALL
 
 import mjsense as mjs
 from mjsense.core.rotations import rotation_of
-from mjsense.viewer import curves, geometry, layer, surfaces
+from mjsense.viewer import curves, geometry, layer, soft, surfaces
 from mjsense.viewer.poses import PoseStream
 
 needs_viser = pytest.mark.skipif(importlib.util.find_spec("viser") is None, reason="viser is not installed: pip install 'mjsense[view]'")
@@ -151,6 +151,7 @@ def test_hidden_groups(tmp_path, port):
     (tmp_path / "model.xml").write_text("<mujoco><worldbody><body name='b' pos='1 2 3'><geom name='g' size='.1' group='3'/></body></worldbody></mujoco>")
     with mjs.view(tmp_path / "model.xml", port=port, block=False, open_browser=False) as viewer:
         assert not viewer._stage._frames
+        assert any(getattr(getattr(m, "props", None), "_markdown", "") == "There are no images." for m in messages(viewer).values())
         viewer._stage.show_groups({3})
         assert np.array_equal(viewer._stage._frames[1].position, (1, 2, 3)) and viewer._stage._solids["geom", 0][0] is not None
         viewer._stage.show_groups({0})
@@ -196,6 +197,16 @@ def test_flexes_skins_tendons_and_sites(tmp_path, port):
         viewer._stage.show_groups({1})
         viewer.update()
         assert not viewer._stage._soft._drawn and not viewer._stage._soft._tendons._nodes
+
+
+def test_a_tendon_over_a_pulley_has_a_gap():
+    model = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><site name='a'/><site name='b' pos='0 0 1'/><site name='c' pos='1 0 1'/></worldbody>
+        <tendon><spatial width='.01'><site site='a'/><site site='b'/><pulley divisor='2'/><site site='b'/><site site='c'/></spatial></tendon></mujoco>""")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    shapes = soft._tendons(model, {0}, lambda name: getattr(data, name))
+    np.testing.assert_array_equal(shapes.positions, [[0, 0, 0], [0, 0, 1]])
+    np.testing.assert_array_equal(shapes.vectors, [[0, 0, 1], [1, 0, 0]])
 
 
 @needs_viser
