@@ -81,7 +81,7 @@ class Judge:
 
     def say(self, *words: object) -> None:
         with self.results.open("a") as file:
-            file.write("\t".join(map(str, words)) + "\n")
+            file.write("\t".join(" ".join(str(word).split()) for word in words) + "\n")
 
     def child(self, item, mutant: dict | None, trace: bool, limit_s: float) -> tuple[bool, list[str]]:
         """(the test passes, mutants that it has entered)"""
