@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tasks and policies as MolmoSpaces' page on sensors writes them, with the imports changed."""
 
+import abc
 import json
+import sys
+import types
 
 import h5py
 import numpy as np
@@ -14,6 +17,7 @@ from mjsense.compat.molmospaces.env.sensors import GraspStateSensor, ObjectStart
 from mjsense.compat.molmospaces.policy.base_policy import InferencePolicy, PlannerPolicy, StatefulPolicy
 from mjsense.compat.molmospaces.tasks.task import BaseMujocoTask
 from mjsense.compat.molmospaces.utils.save_utils import byte_array_to_dict, dict_to_byte_array, is_camera_sensor
+from mjsense.compat.peer.policy import PeerPolicy, register
 
 
 class MyTask(BaseMujocoTask):
@@ -238,6 +242,17 @@ def played(tmp_path_factory):
             rows.append(env.sim.state[0].copy())
         states.append(rows)
     return states
+
+
+def test_a_policy_is_an_instance_of_the_classes_that_have_been_imported(monkeypatch):
+    class PlannerPolicy(abc.ABC):
+        pass
+
+    assert not issubclass(PeerPolicy, PlannerPolicy)
+    monkeypatch.setitem(sys.modules, "molmo_spaces.policy.base_policy", types.SimpleNamespace(PlannerPolicy=PlannerPolicy))
+    for _ in range(2):
+        register()
+        assert issubclass(PeerPolicy, PlannerPolicy)
 
 
 def test_rows_of_text():
