@@ -245,7 +245,7 @@ def played(tmp_path_factory):
 
 
 def test_a_policy_is_an_instance_of_the_classes_that_have_been_imported(monkeypatch):
-    class PlannerPolicy(abc.ABC):
+    class PlannerPolicy(abc.ABC):  # noqa: B024
         pass
 
     assert not issubclass(PeerPolicy, PlannerPolicy)
