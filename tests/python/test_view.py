@@ -108,6 +108,37 @@ def test_a_texture_with_zero_repetitions_is_shown_once():
     np.testing.assert_array_equal(shown("3 0"), shown("3 1"))
 
 
+@pytest.mark.parametrize("repeat", ["1 1", "2 3", "2.5 0"])
+@pytest.mark.parametrize("uniform", ["false", "true"])
+@pytest.mark.parametrize("kind", ["hfield", "mesh"])
+def test_textures_from_above_are_those_of_images(kind, uniform, repeat):
+    """The colours of a luminous surface are the texels at the coordinates that the page gets."""
+    corners = " ".join(f"{x} {y} {z}" for x in (-1, 1) for y in (-0.9, 0.9) for z in (-3, 0))  # the frame of a tall mesh has the z axis of the world
+    model = mujoco.MjModel.from_xml_string(f"""<mujoco><visual><headlight active="0"/></visual>
+        <asset><texture name="t" type="2d" builtin="flat" width="64" height="64"/><hfield name="hfield" nrow="5" ncol="5" size="1 .9 .1 .1"/>
+        <mesh name="mesh" vertex="{corners}"/>
+        <material name="m" texture="t" texrepeat="{repeat}" texuniform="{uniform}" emission="1" specular="0"/></asset>
+        <worldbody><geom type="{kind}" {kind}="{kind}" material="m"/><camera name="c" pos="0 0 3" projection="orthographic" fovy="2"/></worldbody></mujoco>""")
+    texels = np.zeros((64, 64, 3), np.uint8)
+    texels[..., 0], texels[..., 1] = 4 * np.arange(64), 4 * np.arange(64)[:, None]
+    model.tex_data[:] = texels.ravel()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    with mjs.Renderer(model, 64, 64) as renderer:
+        renderer.update_scene(data, "c")
+        image = renderer.render().astype(int)
+    shape = surfaces.of_geom(model, 0, 1.0).shape
+    local = np.linalg.lstsq(np.c_[shape.vertices[:, :2], np.ones(len(shape.vertices))], shape.uv, rcond=None)[0]
+    compared = 0
+    for x, y in np.random.default_rng(0).uniform(-0.8, 0.8, (40, 2)).round(1) + 1 / 64:  # centres of pixels
+        place = (np.array([x, y, 0]) - data.geom_xpos[0]) @ data.geom_xmat[0].reshape(3, 3)
+        texel = (np.array([*place[:2], 1]) @ local) % 1 * 64
+        if (np.abs(texel - 32) < 30).all():  # not where the texture begins anew
+            np.testing.assert_allclose(image[int((1 - y) * 32), int((x + 1) * 32), :2], 4 * texel - 2, atol=8)
+            compared += 1
+    assert compared > 10
+
+
 def test_poses_in_frames_of_bodies():
     model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><body name='b' pos='1 2 3' euler='0 0 90'><geom size='.1'/></body></worldbody></mujoco>")
     data = mujoco.MjData(model)
