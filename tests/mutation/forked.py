@@ -89,6 +89,12 @@ class Judge:
             folder = item.funcargs["tmp_path"]
             shutil.rmtree(folder)
             shutil.copytree(f"{folder}.saved", folder, symlinks=True)
+        function = self.functions[mutant["id"]] if mutant else None
+        changed = None
+        if mutant and function:
+            changed = named(compile(mutant["text"], function.__code__.co_filename, "exec", dont_inherit=True), function.__code__)
+            if changed is None or changed.co_freevars != function.__code__.co_freevars:
+                raise LookupError("the function is not found in the changed file")  # no result
         file = Path(mutant["file"]) if mutant else None
         saved = (file.read_bytes(), file.stat()) if file else None
         if file:
@@ -103,10 +109,8 @@ class Judge:
                 os.setsid()
                 resource.setrlimit(resource.RLIMIT_CPU, (int(limit_s), int(limit_s) + 1))
                 entered: set[types.CodeType] = set()
-                if mutant:
-                    function = self.functions[mutant["id"]]
-                    module = compile(mutant["text"], function.__code__.co_filename, "exec", dont_inherit=True)
-                    function.__code__ = named(module, function.__code__)
+                if function and changed:
+                    function.__code__ = changed
                 for cached in [o for o in gc.get_objects() if isinstance(o, functools._lru_cache_wrapper)]:
                     if getattr(cached, "__module__", "").startswith("mjsense"):
                         cached.cache_clear()
