@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Judges the mutants that draw.py makes: the tests of the mutant's room, then those of the rooms that use it.
+"""Judges the mutants of C++ that draw.py makes: the tests of the mutant's room, then those of the rooms that use it.
 
 All mutants are first judged by the fast tests of their own room, a few seconds each: the tests of the mutated file, then the rest. Those
 that survive are then judged by the slow tests of the room, and by the fast tests of the rooms that use it, of which those that include the
@@ -16,7 +16,7 @@ from pathlib import Path
 SLOW_S = 2  # a test that takes longer is slow
 # Seconds of tests, as measured without a mutant, that judge one mutant: slow ones of its own room, fast ones of other rooms.
 SLOW_OWN_S, OTHERS_S = 20, 30
-PYTHON_S = 120  # seconds of the clock after which no further pytest file judges a mutant of python/
+PYTHON_S = 120  # seconds of the clock after which no further pytest file judges a mutant of the bindings
 MODULE = "python/mjsense/_core.abi3.so"
 OUTCOMES = ["noticed", "survived", "same program", "not compiled"]
 
@@ -109,7 +109,7 @@ class Judge:
     def ask(self, file: str, others: bool) -> tuple[str, str]:
         """(outcome, test that failed) of the mutant that stands in the tree."""
         if file.startswith("python/"):
-            return self.ask_python(file)
+            return self.ask_bindings(file)
         same, built = True, set()
         for program, tests in self.stages(file, others):
             if not tests:
@@ -140,11 +140,11 @@ class Judge:
             self.runner.build(["mjsense_python"])  # a room without fast tests
         return "same program" if others and same else "survived", ""
 
-    def ask_python(self, file: str) -> tuple[str, str]:
-        """The pytest files that name the mutated module's public classes and functions most often."""
-        self.runner.build(["mjsense_python"])  # the Python files of the built package are links to the tree
+    def ask_bindings(self, file: str) -> tuple[str, str]:
+        """The pytest files that name the bound classes and functions of the mutated file most often."""
+        self.runner.build(["mjsense_python"])
         text = (self.root / file).read_text()
-        names = set(re.findall(r"^(?:class|def) ([A-Za-z]\w+)|^    def ([a-z]\w+)|m\.def\(\"(\w+)|nb::class_<.*\"(\w+)\"", text, re.M))
+        names = set(re.findall(r"m\.def\(\"(\w+)|nb::class_<.*\"(\w+)\"", text, re.M))
         words = {w for group in names for w in group if w} | {Path(file).stem.strip("_")}
         pattern = re.compile(r"\b(?:" + "|".join(map(re.escape, sorted(words))) + r")\b")
         found = {f: len(pattern.findall(f.read_text())) / f.stat().st_size for f in (self.root / "tests/python").glob("test_*.py")}
@@ -164,7 +164,7 @@ def judge_all(judge: Judge, mutants: list, results_file: Path, tree: Path, failu
         known = results.get(mutant.id)
         if not known or known["digest"] != mutant.digest:
             return True
-        if known["outcome"] != "survived" or mutant.room.startswith(("python/", "bindings")):
+        if known["outcome"] != "survived" or mutant.room == "bindings":
             return False
         return not known["others"] if others else known["tests"] != judge.version.get(mutant.room)
 

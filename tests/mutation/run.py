@@ -4,7 +4,7 @@
     python tests/mutation/run.py --count 100 --seed 1 [ROOMS]    draws 100 changes and judges them
     python tests/mutation/run.py --count 100 --seed 1 --report   the figures so far, and what survived
 
-draw.py makes the changes, judge.py chooses the tests. The copy is build/mutation/tree with a build folder of its own; results are kept in
+draw.py makes the changes; judge.py chooses the tests of C++, judge_python.py those of Python, which needs no build. The copy is build/mutation/tree with a build folder of its own; results are kept in
 build/mutation/drawn.json, so that a run that was stopped continues. --prefix is put before every build and test, as "nice -n 10".
 """
 
@@ -179,6 +179,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of the draw (%(default)s)")
     parser.add_argument("--part", default="1/1", help="1/2 is every second mutant; each part is run in a checkout of its own")
     parser.add_argument("--report", action="store_true", help="only the figures so far")
+    parser.add_argument("--package", type=Path, default=ROOT / "build/dev/python/mjsense",
+                        help="package with the compiled module, for mutants of Python (%(default)s)")
+    parser.add_argument("--pytests", nargs="+", help="test files that judge mutants of Python, in this order; all if not given")
     parser.add_argument("--prefix", default="nice -n 10", help="before every build and test (%(default)s)")
     parser.add_argument("--limit", type=float, default=LIMIT_S, help="seconds of a test program; one that takes longer has noticed (%(default)s)")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="of a build (%(default)s)")
@@ -190,11 +193,20 @@ def main() -> int:
         WORK.mkdir(parents=True, exist_ok=True)
         copy_tree()
         runner = Runner(options.prefix.split(), options.jobs, options.limit)
-        runner.configure()
-        judge = judging.Judge(runner, ROOT, BUILD, ROOMS, QUICK_PYTESTS)
-        judge.baseline(WORK / "times.json")
         part, parts = map(int, options.part.split("/"))
-        judging.judge_all(judge, mutants[part - 1 :: parts], RESULTS, TREE, Failure)
+        mine = mutants[part - 1 :: parts]
+        if python := [mutant for mutant in mine if mutant.room in PYTHON]:
+            judging_python = module("judge_python")
+            judging_python.link_package(TREE, WORK / "package", options.package.resolve())
+            files = options.pytests or [str(f.relative_to(ROOT)) for f in sorted((ROOT / "tests/python").glob("test_*.py"))]
+            found = judging_python.Judge(options.prefix.split(), TREE, WORK / "package", WORK).judge(python, files)
+            known = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+            RESULTS.write_text(json.dumps(known | found, indent=1))
+        if others := [mutant for mutant in mine if mutant.room not in PYTHON]:
+            runner.configure()
+            judge = judging.Judge(runner, ROOT, BUILD, ROOMS, QUICK_PYTESTS)
+            judge.baseline(WORK / "times.json")
+            judging.judge_all(judge, others, RESULTS, TREE, Failure)
     print(judging.report(mutants, json.loads(RESULTS.read_text()) if RESULTS.exists() else {}, ROOMS))
     return 0
 

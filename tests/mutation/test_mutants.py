@@ -52,3 +52,14 @@ def test_a_seed_draws_the_same_mutants():
     draw = mutation.module("draw").draw
     rooms = ["core", "python/dataset"]
     assert draw(mutation.ROOT, rooms, 20, 7) == draw(mutation.ROOT, rooms, 20, 7) != draw(mutation.ROOT, rooms, 20, 8)
+
+
+def test_the_code_of_a_mutant_replaces_that_of_its_function():
+    text = "def outer(x):\n    def inner():\n        return 1\n    return inner() if x else 2\n"
+    forked, code = mutation.module("forked"), compile(text, "x.py", "exec")
+    assert [forked.inner(code, line).co_name for line in (3, 4)] == ["inner", "outer"]
+    variables = {}
+    exec(code, variables)
+    mutated = compile(text.replace("return 1", "return 7"), "x.py", "exec")
+    variables["outer"].__code__ = forked.named(mutated, variables["outer"].__code__)
+    assert (variables["outer"](1), variables["outer"](0)) == (7, 2)

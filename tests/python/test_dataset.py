@@ -18,7 +18,7 @@ from edited_recordings import changed
 
 import mjsense as mjs
 from mjsense.dataset import json_rows as rows_as_json
-from mjsense.dataset import video
+from mjsense.dataset import video, video_decoder
 
 SMALL = dict(num_worlds=2, episodes=2, keep_failures=True, width=32, height=23, horizon=20, shadows=False, seed=3)
 
@@ -168,6 +168,18 @@ def test_every_frame_of_a_long_video(tmp_path, decoder, encoding):
         np.testing.assert_array_equal(frames[int(t)], expected[t], err_msg=str(t))
     with pytest.raises(RuntimeError, match="has no frame 400"):
         mjs.dataset.Video(video.VideoInfo(path, 401, 32, 24, encoding, 0.0002, Fraction(500, 33)), reader)[400]
+
+
+def test_the_size_of_a_table_of_packets(tmp_path):
+    """With it the cache bounds its memory."""
+    pytest.importorskip("av")
+    path = tmp_path / "x.mkv"
+    source = ["ffmpeg", "-v", "error", "-f", "lavfi", "-i", "testsrc=size=32x24:rate=25", "-frames:v", "300"]
+    subprocess.run([*source, "-c:v", "ffv1", path], check=True)
+    packets = video_decoder.Packets(path, Fraction(25), 300, (32, 24), "")
+    tables = [getattr(packets, name) for name in ("offsets", "sizes", "frames", "keys", "key_frames")]
+    held = sum(sys.getsizeof(table) + sum(map(sys.getsizeof, table)) for table in tables)
+    assert held / 3 < packets.bytes < 3 * held
 
 
 def test_a_recording_of_the_first_format(tmp_path):

@@ -457,3 +457,15 @@ def test_a_video_without_all_frames_is_an_error(root, tmp_path):
         Concatenation(tmp_path / "out.mp4", Fraction(15)).add(video, Fraction(500, 33), 14, 13)
     with pytest.raises(ValueError, match=r"its times are not those of 20 frames per second"):
         Concatenation(tmp_path / "out.mp4", Fraction(15)).add(video, Fraction(20), 13, 12)
+
+
+def test_folders_of_parts_are_joined_in_a_new_one(tmp_path):
+    from mjsense.exporting.output import join_folders
+
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / f"{name}.mcap").write_text(name)
+    join_folders(None, [tmp_path / "a", tmp_path / "b"], tmp_path / "out")
+    assert {path.name: path.read_text() for path in (tmp_path / "out").iterdir()} == {"a.mcap": "a", "b.mcap": "b"}
+    with pytest.raises(FileExistsError):
+        join_folders(None, [], tmp_path / "out")

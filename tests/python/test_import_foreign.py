@@ -108,6 +108,14 @@ def test_env_args(tmp_path, text, message):
         mjs.import_robomimic(robomimic(tmp_path / "demo.hdf5", env_args=text), tmp_path / "out")
 
 
+@pytest.mark.parametrize("stored", [np.bytes_, lambda text: np.array(text, "S200"), lambda text: np.frombuffer(text.ljust(200, b"\0"), np.uint8)],
+                         ids=["bytes", "padded", "array"])  # fmt: skip
+def test_texts_of_a_fixed_length(tmp_path, stored):
+    text = json.dumps({"env_name": "Lift", "env_kwargs": {"control_freq": 25}}).encode()
+    mjs.import_robomimic(robomimic(tmp_path / "demo.hdf5", env_args=stored(text)), tmp_path / "out", model=False)
+    assert mjs.Dataset(tmp_path / "out").episodes[0].fps == 25
+
+
 def test_links_and_bombs(tmp_path):
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = np.zeros((5, 2))

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import zipfile
 
+import h5py
 import numpy as np
 import pytest
 
@@ -31,7 +32,9 @@ def test_an_exported_recording_comes_back(made, tmp_path):
     ours, theirs = mjs.Dataset(made / "data"), mjs.Dataset(tmp_path / "back")
     assert theirs.fps == 15 and [e.length for e in theirs.episodes] == [8, 8]
     for a, b in zip(ours.episodes, theirs.episodes):
-        assert (b.task, b.success) == (a.task, a.success)
+        assert (b.task, b.success, b.outcome) == (a.task, a.success, "no success")
+        with h5py.File(b.path) as file:
+            assert json.loads(file[b.trajectory]["obs_scene"][()])["policy_dt_ms"] == 1000 / 15
         np.testing.assert_array_equal(b["obs/extra/observation/state"], a["obs/agent/qpos/arm"][:-1].astype(np.float32))
         np.testing.assert_array_equal(b["obs/extra/observation/tcp"], a["obs/extra/tcp_pose"][:-1].astype(np.float32))
         np.testing.assert_array_equal(b["actions/action"][1:, :7], a["actions/joint_pos/arm"][1:-1].astype(np.float32))

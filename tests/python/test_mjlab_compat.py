@@ -12,7 +12,8 @@ from wheels import wheel
 from mjsense.compat.mjlab import sensor as ml
 from mjsense.compat.mjlab._tensors import HAS_TORCH
 from mjsense.compat.mjlab._tensors import tensor as ml_tensor
-from mjsense.compat.mjlab.entity import EntityCfg
+from mjsense.compat.mjlab.actuator import BuiltinPositionActuatorCfg
+from mjsense.compat.mjlab.entity import EntityArticulationInfoCfg, EntityCfg
 from mjsense.compat.mjlab.scene import Scene, SceneCfg
 from mjsense.compat.mjlab.sim import Simulation, SimulationCfg
 from mjsense.compat.mjlab.terrains import TerrainEntityCfg
@@ -281,6 +282,17 @@ def two_entities():
     from_string = mujoco.MjSpec.from_string
     scene = Scene(SceneCfg(num_envs=WORLDS, entities={name: EntityCfg(spec_fn=lambda: from_string(ARM)) for name in ("first", "arm")}))
     return scene, Simulation(WORLDS, SimulationCfg(), scene.compile())
+
+
+def test_the_initial_keyframe_commands_its_joint_positions():
+    joints = """<mujoco><worldbody><body><joint name="a" axis="0 1 0"/><geom size=".1"/>
+        <body><joint name="b"/><joint name="c" axis="1 0 0"/><geom size=".1"/></body></body></worldbody></mujoco>"""
+    actuators = BuiltinPositionActuatorCfg(target_names_expr=("[bc]",), stiffness=1.0, damping=0.1)
+    cfg = EntityCfg(spec_fn=lambda: mujoco.MjSpec.from_string(joints), articulation=EntityArticulationInfoCfg(actuators=(actuators,)),
+                    init_state=EntityCfg.InitialStateCfg(joint_pos={"a": 0.1, "b": 0.2, "c": 0.3}))  # fmt: skip
+    key = Scene(SceneCfg(num_envs=1, entities={"arm": cfg})).compile().key(0)
+    np.testing.assert_array_equal(key.qpos, [0.1, 0.2, 0.3])
+    np.testing.assert_array_equal(key.ctrl, [0.2, 0.3])
 
 
 def like_tensor(values):

@@ -97,6 +97,13 @@ def test_other_fields_are_refused(recorded, worlds, tmp_path, name, value, messa
     refuses(worlds, edited(recorded, tmp_path / "data", put(f"model/{name}", value)), f"replay/model/{name}: {message}")
 
 
+def test_other_numbers_of_columns_are_refused(recorded, worlds, tmp_path):
+    model = mjs.Dataset(recorded).episodes[0].model()
+    for name, value in (("geom_size", np.zeros(model.ngeom)), ("body_mass", np.zeros((model.nbody, 2)))):
+        shapes = rf"is float64 \[{', '.join(map(str, value.shape))}\], expected float64 \[{', '.join(map(str, getattr(model, name).shape))}\]"
+        refuses(worlds, edited(recorded, tmp_path / name, put(f"model/{name}", value)), f"replay/model/{name}: {shapes}")
+
+
 @pytest.mark.parametrize("name, value, message", [
     ("held", np.array([10**8, -5], np.int32), r"replay/held\[0\]: is 100000000, expected the id of a free joint"),
     ("held", np.array([0], np.int32), r"replay/held\[0\]: is 0, expected the id of a free joint"),

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tasks and policies as MolmoSpaces' page on sensors writes them, with the imports changed."""
 
+import abc
 import json
+import sys
+import types
 
 import h5py
 import numpy as np
@@ -14,6 +17,7 @@ from mjsense.compat.molmospaces.env.sensors import GraspStateSensor, ObjectStart
 from mjsense.compat.molmospaces.policy.base_policy import InferencePolicy, PlannerPolicy, StatefulPolicy
 from mjsense.compat.molmospaces.tasks.task import BaseMujocoTask
 from mjsense.compat.molmospaces.utils.save_utils import byte_array_to_dict, dict_to_byte_array, is_camera_sensor
+from mjsense.compat.peer.policy import PeerPolicy, register
 
 
 class MyTask(BaseMujocoTask):
@@ -200,6 +204,26 @@ def test_a_policy_with_a_model_plays_the_same_in_any_number_of_worlds(tmp_path, 
         np.testing.assert_array_equal(mine.states, other)
 
 
+class Half(Foreign):
+    """Commands the arm in some worlds, and the gripper in all."""
+
+    def __init__(self, worlds):
+        super().__init__()
+        self.worlds = worlds
+
+    def get_action(self, observation):
+        action = super().get_action(observation)
+        return action if self.task._world in self.worlds else {"gripper": action["gripper"]}
+
+
+def test_worlds_without_a_command_hold_a_group_that_others_command(tmp_path):
+    one, none = (
+        [e.states for e in mjs.evaluate("pick", policy=Half(worlds), out=tmp_path / f"{len(worlds)}", num_worlds=2, **INFERRED | {"episodes": 2}).dataset.episodes]
+        for worlds in ((0,), ()))  # fmt: skip
+    assert not np.array_equal(one[0], none[0])
+    np.testing.assert_array_equal(one[1], none[1])
+
+
 INFERRED = {"episodes": 3, "horizon": 6, "cameras": [], "progress": False}
 
 
@@ -218,6 +242,17 @@ def played(tmp_path_factory):
             rows.append(env.sim.state[0].copy())
         states.append(rows)
     return states
+
+
+def test_a_policy_is_an_instance_of_the_classes_that_have_been_imported(monkeypatch):
+    class PlannerPolicy(abc.ABC):  # noqa: B024
+        pass
+
+    assert not issubclass(PeerPolicy, PlannerPolicy)
+    monkeypatch.setitem(sys.modules, "molmo_spaces.policy.base_policy", types.SimpleNamespace(PlannerPolicy=PlannerPolicy))
+    for _ in range(2):
+        register()
+        assert issubclass(PeerPolicy, PlannerPolicy)
 
 
 def test_rows_of_text():

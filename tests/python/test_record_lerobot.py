@@ -14,6 +14,8 @@ pytest.importorskip("av")
 pytest.importorskip("pyarrow")
 
 import mjsense as mjs
+from mjsense.exporting import record_lerobot
+from mjsense.exporting.mapping import Source
 from mjsense.exporting.output import part_of
 from mjsense.exporting.record_lerobot import CompleteError
 
@@ -45,6 +47,15 @@ def test_it_equals_an_exported_recording(exported, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["out"]  # without keep_recording
     with pytest.raises(ValueError, match=r"append .*cannot be combined with format='lerobot'"):
         mjs.record("pick", out=tmp_path / "more", format="lerobot", append=True, **ARGUMENTS)
+
+
+def test_files_with_different_features_are_converted_together(exported, tmp_path, monkeypatch):
+    def source(place, **options):
+        return Source(place, **options | ({"map": {"state": "obs/extra/tcp_pose"}} if place.name == "trajectories_batch_1_of_3.h5" else {}))
+
+    monkeypatch.setattr(record_lerobot, "Source", source)
+    mjs.record("pick", out=tmp_path / "out", format="lerobot", **ARGUMENTS)
+    assert tree(tmp_path / "out") == exported
 
 
 @pytest.mark.parametrize("keep", (False, True))

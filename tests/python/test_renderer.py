@@ -63,6 +63,7 @@ def test_properties_and_defaults():
     assert (renderer.height, renderer.width, renderer.model) == (240, 320, model)
     assert isinstance(renderer.scene, mujoco.MjvScene)
     assert renderer.scene.maxgeom == 10000
+    assert (renderer.shading, renderer.environment, renderer.samples_per_pixel) == ("classic", "model", 64)
     renderer.update_scene(data)
     image = renderer.render()
     assert image.shape == (240, 320, 3)
@@ -149,6 +150,7 @@ def test_data_of_a_model_that_was_compiled_anew_is_refused():
         (lambda m, d: m.geom_rgba, r"geom 0 of the scene \(geom 'ball', id 0\) has a pose, size or colour that is not finite"),
         (lambda m, d: d.light_xdir, r"light 1 of the scene( \(light 'lamp', id 0\))? has a pose or colour that is not finite"),
         (lambda m, d: m.light_diffuse, r"light 1 of the scene( \(light 'lamp', id 0\))? has a pose or colour that is not finite"),
+        (lambda m, d: m.vis.headlight.diffuse, r"Renderer: light 0 of the scene has a pose or colour that is not finite"),
         (lambda m, d: d.cam_xpos, r"the scene's camera \(camera 'front', id 0\) has a pose or field of view that is not finite"),
         (lambda m, d: m.cam_fovy, r"the scene's camera \(camera 'front', id 0\) has a pose or field of view that is not finite"),
     ],

@@ -56,6 +56,18 @@ def test_data_without_poses_warns_once_at_the_caller():
     assert images[0].any() and not images[1].any()
 
 
+def test_poses_of_a_model_without_bodies():
+    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='.5'/></worldbody></mujoco>")
+    data = mujoco.MjData(model)
+    renderer = mjs.Renderer(model, 20, 30)
+    with pytest.warns(UserWarning, match=re.escape(NO_POSES)):
+        renderer.update_scene(data)
+    mujoco.mj_forward(model, data)
+    renderer = mjs.Renderer(model, 20, 30)
+    renderer.update_scene(data)  # a warning would be an error
+    assert renderer.render().any()
+
+
 def test_a_fixed_camera_of_data_without_poses_sees_nothing():
     model, data = load(BALL)
     mujoco.mj_resetData(model, data)

@@ -4,12 +4,13 @@
 import os
 import re
 import signal
+import sys
 import threading
 import time
 
 import numpy as np
 import pytest
-from renderer_scenes import SHAPES, load
+from renderer_scenes import BALL, SHAPES, load
 from test_fork import in_fork
 
 import mjsense as mjs
@@ -174,3 +175,18 @@ def test_close_in_a_signal_handler(renderer):
     finally:
         timer.join()
         signal.signal(signal.SIGUSR1, before)
+
+
+def test_an_interrupted_batch_leaves_no_image_for_later(monkeypatch):
+    model, data = load(BALL)
+    submitted = []
+
+    def interrupted(running):
+        submitted.extend(running)
+        raise KeyboardInterrupt
+
+    with mjs.Renderer(model, 240, 320) as renderer:
+        monkeypatch.setattr(sys.modules["mjsense.rendering.renderer"], "wait", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            renderer.render_batch([data] * 100, "front")
+        assert len(submitted) == 100 and all(one.running() or one.done() for one in submitted)

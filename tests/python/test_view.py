@@ -19,7 +19,7 @@ from scenes import BALL
 
 import mjsense as mjs
 from mjsense.core.rotations import rotation_of
-from mjsense.viewer import curves, geometry, surfaces
+from mjsense.viewer import curves, geometry, layer, soft, surfaces
 from mjsense.viewer.poses import PoseStream
 
 needs_viser = pytest.mark.skipif(importlib.util.find_spec("viser") is None, reason="viser is not installed: pip install 'mjsense[view]'")
@@ -96,6 +96,49 @@ def test_textures_of_boxes():
     assert rows.tolist() == expected
 
 
+def test_a_texture_with_zero_repetitions_is_shown_once():
+    """As in MuJoCo's images."""
+    def shown(repeat):
+        model = mujoco.MjModel.from_xml_string(f"""<mujoco><asset><texture name="t" type="2d" builtin="checker" width="8" height="8"/>
+            <material name="m" texture="t" texrepeat="{repeat}"/></asset>
+            <worldbody><geom type="plane" size="1 2 1" material="m"/></worldbody></mujoco>""")
+        return surfaces.of_geom(model, 0, 1.0).shape.uv
+
+    np.testing.assert_array_equal(shown("0 0"), shown("1 1"))
+    np.testing.assert_array_equal(shown("3 0"), shown("3 1"))
+
+
+@pytest.mark.parametrize("repeat", ["1 1", "2 3", "2.5 0"])
+@pytest.mark.parametrize("uniform", ["false", "true"])
+@pytest.mark.parametrize("kind", ["hfield", "mesh"])
+def test_textures_from_above_are_those_of_images(kind, uniform, repeat):
+    """The colours of a luminous surface are the texels at the coordinates that the page gets."""
+    corners = " ".join(f"{x} {y} {z}" for x in (-1, 1) for y in (-0.9, 0.9) for z in (-3, 0))  # the frame of a tall mesh has the z axis of the world
+    model = mujoco.MjModel.from_xml_string(f"""<mujoco><visual><headlight active="0"/></visual>
+        <asset><texture name="t" type="2d" builtin="flat" width="64" height="64"/><hfield name="hfield" nrow="5" ncol="5" size="1 .9 .1 .1"/>
+        <mesh name="mesh" vertex="{corners}"/>
+        <material name="m" texture="t" texrepeat="{repeat}" texuniform="{uniform}" emission="1" specular="0"/></asset>
+        <worldbody><geom type="{kind}" {kind}="{kind}" material="m"/><camera name="c" pos="0 0 3" projection="orthographic" fovy="2"/></worldbody></mujoco>""")
+    texels = np.zeros((64, 64, 3), np.uint8)
+    texels[..., 0], texels[..., 1] = 4 * np.arange(64), 4 * np.arange(64)[:, None]
+    model.tex_data[:] = texels.ravel()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    with mjs.Renderer(model, 64, 64) as renderer:
+        renderer.update_scene(data, "c")
+        image = renderer.render().astype(int)
+    shape = surfaces.of_geom(model, 0, 1.0).shape
+    local = np.linalg.lstsq(np.c_[shape.vertices[:, :2], np.ones(len(shape.vertices))], shape.uv, rcond=None)[0]
+    compared = 0
+    for x, y in np.random.default_rng(0).uniform(-0.8, 0.8, (40, 2)).round(1) + 1 / 64:  # centres of pixels
+        place = (np.array([x, y, 0]) - data.geom_xpos[0]) @ data.geom_xmat[0].reshape(3, 3)
+        texel = (np.array([*place[:2], 1]) @ local) % 1 * 64
+        if (np.abs(texel - 32) < 30).all():  # not where the texture begins anew
+            np.testing.assert_allclose(image[int((1 - y) * 32), int((x + 1) * 32), :2], 4 * texel - 2, atol=8)
+            compared += 1
+    assert compared > 10
+
+
 def test_poses_in_frames_of_bodies():
     model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><body name='b' pos='1 2 3' euler='0 0 90'><geom size='.1'/></body></worldbody></mujoco>")
     data = mujoco.MjData(model)
@@ -139,6 +182,7 @@ def test_hidden_groups(tmp_path, port):
     (tmp_path / "model.xml").write_text("<mujoco><worldbody><body name='b' pos='1 2 3'><geom name='g' size='.1' group='3'/></body></worldbody></mujoco>")
     with mjs.view(tmp_path / "model.xml", port=port, block=False, open_browser=False) as viewer:
         assert not viewer._stage._frames
+        assert any(getattr(getattr(m, "props", None), "_markdown", "") == "There are no images." for m in messages(viewer).values())
         viewer._stage.show_groups({3})
         assert np.array_equal(viewer._stage._frames[1].position, (1, 2, 3)) and viewer._stage._solids["geom", 0][0] is not None
         viewer._stage.show_groups({0})
@@ -186,6 +230,16 @@ def test_flexes_skins_tendons_and_sites(tmp_path, port):
         assert not viewer._stage._soft._drawn and not viewer._stage._soft._tendons._nodes
 
 
+def test_a_tendon_over_a_pulley_has_a_gap():
+    model = mujoco.MjModel.from_xml_string("""<mujoco><worldbody><site name='a'/><site name='b' pos='0 0 1'/><site name='c' pos='1 0 1'/></worldbody>
+        <tendon><spatial width='.01'><site site='a'/><site site='b'/><pulley divisor='2'/><site site='b'/><site site='c'/></spatial></tendon></mujoco>""")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    shapes = soft._tendons(model, {0}, lambda name: getattr(data, name))
+    np.testing.assert_array_equal(shapes.positions, [[0, 0, 0], [0, 0, 1]])
+    np.testing.assert_array_equal(shapes.vectors, [[0, 0, 1], [1, 0, 0]])
+
+
 @needs_viser
 def test_a_taken_port_and_the_address(live, capsys):
     assert re.fullmatch(rf"http://127\.0\.0\.1:{live.port}/[\w-]{{32}}", live.url)
@@ -206,7 +260,16 @@ def test_controls_shapes_and_curves(live):
     assert len(live._curves._history["qpos"]) >= 5
     names = {m.name for m in messages(live).values() if hasattr(m, "name")}
     assert {"/shapes/sphere", "/shapes/arrow"} <= names
+    balls = next(m.props for m in messages(live).values() if getattr(m, "name", "") == "/shapes/sphere")
+    assert not balls.cast_shadow and not balls.receive_shadow
     live._source.set_joint(0, 0, 0.1) if live._source.joints() else None
+
+
+def test_a_cylinder_lies_along_its_vector():
+    for vector in ((0, 0, 2), (0, 0, -2), (1, 0, 0), (0.3, -0.4, 1.2)):
+        turned = rotation_of(layer._turn(np.array(vector, float)))[:, 2]
+        np.testing.assert_allclose(turned, np.array(vector) / np.linalg.norm(vector), atol=1e-9)
+    np.testing.assert_array_equal(layer._turn(np.zeros(3)), (1, 0, 0, 0))
 
 
 @needs_viser

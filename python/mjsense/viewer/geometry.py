@@ -178,7 +178,7 @@ def _height_field(model: Any, field: int) -> Triangles:
     dx, dy = np.gradient(heights, axis=1), np.gradient(heights, axis=0)
     spacing = 2 * rx / max(columns - 1, 1), 2 * ry / max(rows - 1, 1)
     normals = np.stack([-dx / spacing[0], -dy / spacing[1], np.ones_like(heights)], -1).reshape(-1, 3)
-    uv = np.stack([vertices[..., 0] * (0.5 / rx), vertices[..., 1] * (-0.5 / ry)], -1) - 0.5
+    uv = np.stack([vertices[..., 0] * (0.5 / rx), vertices[..., 1] * (-0.5 / ry)], -1)  # from -0.5 to 0.5
     return Triangles(
         vertices.reshape(-1, 3).astype(np.float32),
         _grid_faces(*heights.shape),

@@ -144,13 +144,14 @@ def _mapped(model: Any, geom: int, shape: Triangles) -> Triangles:
     size = _extent(model, geom)
     uv = shape.uv
     if uv is None:
-        scale = 0.5 / np.maximum(size[:2], 1e-9) * (1, -1)
-        uv = shape.vertices[:, :2] * scale - 0.5
-    repeat[repeat <= 0] = 1
+        uv = shape.vertices[:, :2] * (0.5 / np.maximum(size[:2], 1e-9) * (1, -1))
+    from_above = shape.uv is None or kind == mujoco_names.Geom.HFIELD
+    if not from_above:
+        repeat[repeat <= 0] = 1
     if model.mat_texuniform[material]:
         repeat *= np.where(size[:2] > 0, size[:2], 1)
     uv = uv * repeat
-    if kind == mujoco_names.Geom.PLANE and (model.geom_size[geom, :2] <= 0).any():
+    if from_above or (kind == mujoco_names.Geom.PLANE and (model.geom_size[geom, :2] <= 0).any()):
         uv = uv - 0.5
     return shape._replace(uv=uv.astype(np.float32))
 

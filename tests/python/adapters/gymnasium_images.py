@@ -35,4 +35,21 @@ for name, (arguments, psnr) in ENVIRONMENTS.items():
         images.append(env.render())
         env.close()
     compare(name, *images, psnr)
+
+# A second call of use() closes the renderer of the first, and env.close() that of the second.
+env = adapter.use(gymnasium.make("HalfCheetah-v5", render_mode="rgb_array", width=84, height=84))
+env.reset(seed=0)
+viewers = []
+for shading in ("classic", "pbr"):
+    adapter.use(env, shading)
+    env.render()
+    viewers.append(adapter.renderer_of(env).viewer)
+env.close()
+for viewer in viewers:
+    try:
+        viewer._renderer.render()
+    except RuntimeError as error:
+        assert "used after close()" in str(error), error
+    else:
+        raise AssertionError("a renderer is not closed")
 end()
