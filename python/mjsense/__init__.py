@@ -75,7 +75,6 @@ from mjsense.evaluation.playing import evaluate
 from mjsense.evaluation.timing import wrap_policy
 from mjsense.exporting import export
 from mjsense.recording import RecordEpisodes, Recorder
-from mjsense.rendering import Renderer
 from mjsense.scene import Scene
 from mjsense.sensors import (
     BuiltinSensorCfg,
@@ -108,7 +107,7 @@ from mjsense.sensors import (
     effects,
     observations,
 )
-from mjsense.sim import Simulation, attach
+from mjsense.sim import Renderer, Simulation, attach
 from mjsense.tasks import gymnasium_registry
 from mjsense.tasks.env import make
 from mjsense.tasks.policy import Policy, policy_names, register_policy

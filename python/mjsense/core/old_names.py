@@ -24,6 +24,7 @@ OLD_NAMES = {
     "mjsense.errors": "mjsense.core.errors",
     "mjsense.export": "mjsense.exporting",
     "mjsense.observations": "mjsense.sensors.observations",
+    "mjsense.rendering": "mjsense.sim",
     "mjsense.rl": "mjsense.tasks.rl",
     "mjsense.rl.rsl": "mjsense.tasks.rl.rsl",
     "mjsense.rl.sb3": "mjsense.tasks.rl.sb3",
