@@ -119,7 +119,7 @@ SIGNATURES = {
         ("task", "robot", "policy", "scene", "out", "action_noise", "keep_failures", *OF_ATTEMPTS),
         defaults={"terminate_upon_success": "True"},
     ),
-    "tasks/vector.py": Signature(
+    "tasks/making.py": Signature(
         ("RolloutCfg",),
         ("task", "robot", "policy", "scene"),
         {"num_worlds": "num_envs"},

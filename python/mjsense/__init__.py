@@ -109,13 +109,12 @@ from mjsense.sensors import (
 )
 from mjsense.sim import Renderer, Simulation, attach
 from mjsense.tasks import gymnasium_registry
-from mjsense.tasks.env import make
+from mjsense.tasks.making import make, make_vec
 from mjsense.tasks.policy import Policy, policy_names, register_policy
 from mjsense.tasks.recording import record
 from mjsense.tasks.robot import Robot
 from mjsense.tasks.task import Task, register_task, task_names
 from mjsense.tasks.teleoperation import play
-from mjsense.tasks.vector import make_vec
 from mjsense.viewer import plot, view
 
 later_rooms.provide(

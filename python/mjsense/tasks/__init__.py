@@ -20,14 +20,15 @@ if TYPE_CHECKING:
         SceneSkyCfg,
         SceneVaryCfg,
     )
-    from mjsense.tasks.env import TaskEnv, make
+    from mjsense.tasks.env import TaskEnv
+    from mjsense.tasks.making import make, make_vec
     from mjsense.tasks.policy import Policy, policy_names, register_policy
     from mjsense.tasks.record_job import RecordProgress, RecordSummary
     from mjsense.tasks.recording import record
     from mjsense.tasks.robot import MoveGroup, Robot, RobotCamera
     from mjsense.tasks.task import Task, WorldState, register_task, task_names
     from mjsense.tasks.teleoperation import Teleoperation, play
-    from mjsense.tasks.vector import TaskVectorEnv, make_vec
+    from mjsense.tasks.vector import TaskVectorEnv
 
 _NAMES = {
     "sensors.configs": (
@@ -40,14 +41,15 @@ _NAMES = {
         "SceneSkyCfg",
         "SceneVaryCfg",
     ),
-    "tasks.env": ("TaskEnv", "make"),
+    "tasks.env": ("TaskEnv",),
+    "tasks.making": ("make", "make_vec"),
     "tasks.policy": ("Policy", "policy_names", "register_policy"),
     "tasks.record_job": ("RecordProgress", "RecordSummary"),
     "tasks.recording": ("record",),
     "tasks.robot": ("MoveGroup", "Robot", "RobotCamera"),
     "tasks.task": ("Task", "WorldState", "register_task", "task_names"),
     "tasks.teleoperation": ("Teleoperation", "play"),
-    "tasks.vector": ("TaskVectorEnv", "make_vec"),
+    "tasks.vector": ("TaskVectorEnv",),
 }
 _MODULES = {name: module for module, names in _NAMES.items() for name in names}
 
