@@ -41,7 +41,7 @@ ROOMS = (
     "mjsense.sim",
     "mjsense.viewer",
 )
-"""Modules whose public names were at the top of ``mjsense``."""
+"""Modules whose public names ``mjsense`` has too, with a warning. If two of them have a name, it is that of the first one."""
 
 
 class _OldModule(ModuleType):

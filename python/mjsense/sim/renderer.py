@@ -27,6 +27,7 @@ _SIZES = (
     "nmat",
 )
 # fmt: on
+"""Sizes of the model that must stay the same, and that data must have."""
 
 _KINDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "rgb": (np.uint8, (3,)),

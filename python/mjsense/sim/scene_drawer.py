@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images of MuJoCo's abstract scene (``mjvScene``): what the renderer in C++ reads of the scene and its
-model, and errors that name the model's elements."""
+"""Images of MuJoCo's abstract scene (``mjvScene``): what the renderer in C++ reads of the scene and its model, and errors in which
+elements have names."""
 
 from __future__ import annotations
 

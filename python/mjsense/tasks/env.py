@@ -36,7 +36,7 @@ class TaskEnv(gymnasium.Env):
 
     def __reduce__(self) -> Any:
         """A copy, or what is pickled, is a new environment with the same arguments, in which no episode has begun."""
-        return self.worlds._recipe(TaskEnv, self.spec)
+        return self.worlds._reduced(TaskEnv, self.spec)
 
     def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
         """Starts the next episode; with a seed, the first episode of that seed."""

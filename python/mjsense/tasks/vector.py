@@ -125,10 +125,10 @@ class TaskVectorEnv(VectorEnv):
 
     def __reduce__(self) -> Any:
         """A copy, or what is pickled, is a new environment with the same arguments, in which no episode has begun."""
-        return self._recipe(None, self.spec)
+        return self._reduced(None, self.spec)
 
-    def _recipe(self, wrapper: Callable[..., Any] | None, spec: Any) -> Any:
-        """What ``__reduce__`` returns, for a wrapper of this environment too. Raises TypeError if an argument belongs to this
+    def _reduced(self, wrapper: Callable[..., Any] | None, spec: Any) -> Any:
+        """What ``__reduce__`` returns, of this environment or of a wrapper of it. Raises TypeError if an argument belongs to this
         environment."""
         if self._made_by is None:
             raise TypeError("TaskVectorEnv: only environments of make() and make_vec() can be copied or pickled")
