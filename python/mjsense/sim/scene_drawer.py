@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images of MuJoCo's abstract scene (``mjvScene``): what the renderer in C++ reads of the scene and its model, and errors in which
-elements have names."""
+"""Images of MuJoCo's abstract scene (``mjvScene``): what the renderer in C++ reads of the scene and its model, and its errors
+with the names of elements."""
 
 from __future__ import annotations
 
