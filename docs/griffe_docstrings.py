@@ -14,13 +14,27 @@ import griffe
 
 ROLE = re.compile(r":(?:class|func|meth|mod|attr):`~?([\w.]+)`")
 
-_MODULE = ast.parse((Path(__file__).parents[1] / "python/mjsense/core/old_names.py").read_text())
-_MOVED = next(
-    ast.literal_eval(node.value)
-    for node in _MODULE.body
-    if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "MOVED"
-)
-ROOMS = {name: room for room, names in _MOVED.items() for name in names}
+PACKAGE = Path(__file__).parents[1] / "python/mjsense"
+
+
+def assigned(module: Path, name: str) -> Any:
+    """What a module assigns to a name: a list or a tuple."""
+    body = ast.parse(module.read_text()).body
+    return next(node.value for node in body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == name)
+
+
+def public(module: Path) -> set[str]:
+    """The names in ``__all__``, in which ``*configs.__all__`` stands for those of another module."""
+    elements = assigned(module, "__all__").elts
+    others = [module.with_name(f"{one.value.value.id}.py") for one in elements if isinstance(one, ast.Starred)]
+    return {one.value for one in elements if isinstance(one, ast.Constant)}.union(*map(public, others))
+
+
+ROOMS = {
+    name: room
+    for room in reversed(ast.literal_eval(assigned(PACKAGE / "core/old_names.py", "ROOMS")))
+    for name in public(PACKAGE / room.removeprefix("mjsense.") / "__init__.py") - public(PACKAGE / "__init__.py")
+}
 """Modules of the public names that are not at the top of the package."""
 
 STATES = {"_State": ("float64", "NDArray[float64]"), "Component": ("float32, on the device", "Any")}

@@ -119,7 +119,7 @@ SIGNATURES = {
         ("task", "robot", "policy", "scene", "out", "action_noise", "keep_failures", *OF_ATTEMPTS),
         defaults={"terminate_upon_success": "True"},
     ),
-    "tasks/vector.py": Signature(
+    "tasks/making.py": Signature(
         ("RolloutCfg",),
         ("task", "robot", "policy", "scene"),
         {"num_worlds": "num_envs"},
@@ -164,8 +164,14 @@ from typing import Any
 
 from mjsense.commands.fields import Field
 
-FIELDS = {
-%s}
+_FIELDS = [
+%s]
+"""The configurations that have a field, and the field, in the order of each of them."""
+
+FIELDS: dict[str, list[Field]] = {}
+for _structs, _field in _FIELDS:
+    for _struct in _structs.split():
+        FIELDS.setdefault(_struct, []).append(_field)
 
 NAMES: dict[str, Any] = {
 %s}
@@ -505,15 +511,25 @@ class Generator:
     # ------------------------------------------------------------------------------------------------------ program
 
     def program_table(self) -> str:
-        structs = ""
+        lines: list[tuple[list[str], str]] = []
         for struct, renamed in OPTIONS.items():
-            rows = [self.program_option(f, renamed.get(f["name"], f["name"])) for f in self.offered(struct) if "type" in f]
-            structs += f"    {quoted(struct)}: [\n" + "".join(row for row in rows if row) + "    ],\n"
-        names = self.names
-        return TABLE % (NOTE, structs, "".join(f"    {quoted(kind)}: {json.dumps(known)},\n" for kind, known in names.items()))
+            options = [self.program_option(f, renamed.get(f["name"], f["name"])) for f in self.offered(struct) if "type" in f]
+            place = 0
+            for row in filter(None, options):
+                known = [line for _, line in lines]
+                if row in known[place:]:
+                    place = known.index(row, place)
+                    lines[place][0].append(struct)
+                else:
+                    place = place or len(lines)  # a configuration that shares no field is at the end
+                    lines.insert(place, ([struct], row))
+                place += 1
+        fields = "".join(f"    ({' '.join(structs)!r}, {row}),\n" for structs, row in lines)
+        names = "".join(f"    {quoted(kind)}: {json.dumps(known)},\n" for kind, known in self.names.items())
+        return TABLE % (NOTE, fields, names)
 
     def program_option(self, f: dict[str, Any], parameter: str) -> str:
-        """A line of the table; empty for a field that cannot be written as one text."""
+        """An entry of the table; empty for a field that cannot be written as one text."""
         t, is_list = f["type"], False
         while t["kind"] in ("optional", "list"):
             is_list |= t["kind"] == "list"
@@ -542,7 +558,7 @@ class Generator:
         given = "".join(
             f", {name}={value!r}" for name, value in more.items() if not (value is None or value is False or value in ("", []))
         )
-        return f"        Field({parameter!r}, {f['option']!r}, {f['flag']!r}, {kind!r}, {text!r}{given}),\n"
+        return f"Field({parameter!r}, {f['option']!r}, {f['flag']!r}, {kind!r}, {text!r}{given})"
 
     def files(self) -> dict[Path, str]:
         out = {SENSORS / f"{module}.py": self.python(module) for module in MODULES}

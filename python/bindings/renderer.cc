@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Bindings of images of abstract scenes. python/mjsense/rendering/renderer.py defines the public class, which
+// Bindings of images of abstract scenes. python/mjsense/sim/renderer.py defines the public class, which
 // lets only one thread at a time call a renderer.
 
 #include <nanobind/nanobind.h>
@@ -168,7 +168,7 @@ struct BoundRenderer {
 // render::ExrReader.
 std::string radiance_of_exr(const std::string& path, const std::string& bytes) {
   const nb::gil_scoped_acquire gil;
-  const nb::object read = nb::module_::import_("mjsense.rendering.exr").attr("radiance_file");
+  const nb::object read = nb::module_::import_("mjsense.core.exr").attr("radiance_file");
   const auto made = nb::cast<nb::bytes>(read(path, nb::bytes(bytes.data(), bytes.size())));
   return {made.c_str(), made.size()};
 }

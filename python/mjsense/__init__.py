@@ -75,7 +75,6 @@ from mjsense.evaluation.playing import evaluate
 from mjsense.evaluation.timing import wrap_policy
 from mjsense.exporting import export
 from mjsense.recording import RecordEpisodes, Recorder
-from mjsense.rendering import Renderer
 from mjsense.scene import Scene
 from mjsense.sensors import (
     BuiltinSensorCfg,
@@ -108,15 +107,14 @@ from mjsense.sensors import (
     effects,
     observations,
 )
-from mjsense.sim import Simulation, attach
+from mjsense.sim import Renderer, Simulation, attach
 from mjsense.tasks import gymnasium_registry
-from mjsense.tasks.env import make
+from mjsense.tasks.making import make, make_vec
 from mjsense.tasks.policy import Policy, policy_names, register_policy
 from mjsense.tasks.recording import record
 from mjsense.tasks.robot import Robot
 from mjsense.tasks.task import Task, register_task, task_names
 from mjsense.tasks.teleoperation import play
-from mjsense.tasks.vector import make_vec
 from mjsense.viewer import plot, view
 
 later_rooms.provide(

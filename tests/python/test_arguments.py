@@ -12,12 +12,13 @@ from scenes import BALL, ball_scene, feet_cfg
 
 import mjsense as mjs
 from mjsense.cluster import exporting as cluster_exporting
-from mjsense.core.old_names import MOVED
+from mjsense.core.old_names import ROOMS
 
 # Users write the methods of the first three; environments have those of Gymnasium, see below. A viewer is made by a function.
 ENVS = (mjs.tasks.TaskVectorEnv, mjs.RecordEpisodes, mjs.recording.RecordVectorEpisodes)
-SKIPPED = (mjs.Sensor, mjs.Task, mjs.Policy, mjs.viewer.Viewer, *ENVS)
-PUBLIC = [*vars(mjs).values(), *(getattr(sys.modules[room], name) for room, names in MOVED.items() for name in names)]
+MADE = (mjs.exporting.Format, mjs.exporting.Option, mjs.exporting.Source)  # what a user-defined export format reads
+SKIPPED = (mjs.Sensor, mjs.Task, mjs.Policy, mjs.viewer.Viewer, *ENVS, *MADE)
+PUBLIC = [*vars(mjs).values(), *(getattr(sys.modules[room], name) for room in ROOMS for name in sys.modules[room].__all__)]
 CLASSES = [
     value
     for value in PUBLIC

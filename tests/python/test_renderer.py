@@ -9,6 +9,7 @@ import pytest
 from renderer_scenes import BALL, SHAPES, image_of, load
 
 import mjsense as mjs
+from mjsense.sim.scene_drawer import SceneDrawer
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -257,24 +258,24 @@ def test_only_what_an_image_shows_is_prepared():
     model, data = load(FEW_MESHES)
     renderer = mjs.Renderer(model, 32, 32)
     nothing = {"meshes": 0, "clusters": 0, "trees": 0, "surfaces": 0, "textures": 0, "levels": 0}
-    assert renderer._native.prepared() == nothing
+    assert renderer._opened().native.prepared() == nothing
     renderer.update_scene(data, "front")
     renderer.enable_depth_rendering()
     renderer.render()
-    assert renderer._native.prepared() == nothing | {"meshes": 2, "clusters": 1}
+    assert renderer._opened().native.prepared() == nothing | {"meshes": 2, "clusters": 1}
     renderer.disable_depth_rendering()
     renderer.render()
-    prepared = renderer._native.prepared()
+    prepared = renderer._opened().native.prepared()
     # No trees without shadows; of the texture's ten levels only those as coarse as the image, and one more.
     assert prepared == nothing | {"meshes": 2, "clusters": 1, "surfaces": 1, "textures": 1, "levels": prepared["levels"]}
     assert 1 <= prepared["levels"] <= 7
     renderer.update_scene(data, "back")
     renderer.render()
-    assert renderer._native.prepared() == prepared | {"clusters": 2, "surfaces": 2}
+    assert renderer._opened().native.prepared() == prepared | {"clusters": 2, "surfaces": 2}
     model.light_castshadow[:] = 1
     renderer.update_scene(data, "front")
     renderer.render()
-    assert renderer._native.prepared()["trees"] >= 1
+    assert renderer._opened().native.prepared()["trees"] >= 1
 
 
 def test_parts_prepared_later_show_the_current_model():
@@ -282,7 +283,7 @@ def test_parts_prepared_later_show_the_current_model():
     with mjs.Renderer(model, 120, 120) as renderer:
         renderer.update_scene(data, "front")
         renderer.render()
-        levels = renderer._native.prepared()["levels"]
+        levels = renderer._opened().native.prepared()["levels"]
         model.mesh_vert[model.mesh_vertadr[1] :] *= 0.5
         model.tex_data[:] = model.tex_data[::-1] // 2
         for camera, size in (("back", 120), ("front", 120), ("front", 1200)):
@@ -292,7 +293,7 @@ def test_parts_prepared_later_show_the_current_model():
                 other.update_scene(data, camera)
                 for kind, image in other.render_images().items():
                     np.testing.assert_array_equal(found[kind], image)
-        assert renderer._native.prepared()["levels"] > levels
+        assert renderer._opened().native.prepared()["levels"] > levels
 
 
 def test_reload_shows_a_small_change():
@@ -471,8 +472,7 @@ def point_lit(light, head=OFF, version=None, drawn=False):
     model, data = load(POINT.format(head=head, light=light))
     with mjs.Renderer(model, 60, 80) as renderer:
         if version:
-            renderer._version = version
-            renderer._native = renderer._make_native()
+            renderer._drawer = SceneDrawer(model, renderer.scene, version)
         renderer.point_lights = drawn
         renderer.update_scene(data, "view")
         return renderer.render()

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 
-from mjsense.commands.parser import Parser, add_name, field_values
+from mjsense.commands.parser import Parser, add_name, add_no_terminate, field_values
 
 EXAMPLES = [
     (
@@ -52,14 +52,7 @@ def add_arguments(parser: Parser) -> None:
         "benchmark.json.",
     )
     add_name(parser, "task", "tasks", "create: name of the task. check and export: a benchmark.", metavar="TASK")
-    parser.add_argument(
-        "--no-terminate-upon-success",
-        dest="terminate_upon_success",
-        action="store_const",
-        const=False,
-        default=argparse.SUPPRESS,
-        help="Do not end an episode at its first success: the last observation decides.",
-    )
+    add_no_terminate(parser)
     parser.add_fields("RecordJobCfg", ("task",), _NOT_FIXED)
     parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from mjsense.commands._policy import add_policy_options, policy_options
 from mjsense.commands._ray import add_ray
-from mjsense.commands.parser import Parser, add_name, complete, field_values
+from mjsense.commands.parser import Parser, add_name, add_no_terminate, complete, field_values
 
 if TYPE_CHECKING:
     from mjsense.tasks.record_job import RecordProgress
@@ -89,14 +89,7 @@ def add_arguments(parser: Parser) -> None:
         "distractors, instruction, start, latency=SECONDS; separated by commas. light=0.5 changes half as much, "
         "distractors=5 is the number of objects.",
     )
-    parser.add_argument(
-        "--no-terminate-upon-success",
-        dest="terminate_upon_success",
-        action="store_const",
-        const=False,
-        default=argparse.SUPPRESS,
-        help="Do not end an episode at its first success: the last observation decides.",
-    )
+    add_no_terminate(parser)
     parser.add_fields("RecordJobCfg", ("task", "policy"), _NOT_OFFERED)
     parser.add_set_options()
     add_ray(parser, "Evaluate")

@@ -162,6 +162,18 @@ def add_name(parser: Parser, dest: str, names: str, text: str, **options: Any) -
     setattr(action, "shown_default", options.get("default"))  # noqa: B010
 
 
+def add_no_terminate(parser: Parser) -> None:
+    """Adds ``--no-terminate-upon-success`` for commands in which an episode ends at its first success."""
+    parser.add_argument(
+        "--no-terminate-upon-success",
+        dest="terminate_upon_success",
+        action="store_const",
+        const=False,
+        default=argparse.SUPPRESS,
+        help="Do not end an episode at its first success: the last observation decides.",
+    )
+
+
 def add_steps(parser: Parser, text: str, default: int) -> None:
     """Adds ``--steps``."""
 

@@ -13,8 +13,8 @@ import warp as wp
 
 from mjsense import _core
 from mjsense.compat import _warp_rendering
+from mjsense.core.mujoco_names import STATE
 from mjsense.sim import foreign_model
-from mjsense.sim.attached import _STATE
 
 _OTHER = ("qLD", "qLDiagInv", "qLU", "qH", "qHDiagInv")
 """Fields that have the names of fields of MuJoCo, with different contents."""
@@ -106,7 +106,7 @@ class Worlds:
             for name in _array_fields(part):
                 rows = part.worldid.shape[0] if kind == "contact" else data.nworld
                 field = f"efc_{name}" if prefix == "efc." else name
-                done = name not in _OTHER and self._add(kind, part, name, field, rows, not prefix and name in _STATE)
+                done = name not in _OTHER and self._add(kind, part, name, field, rows, not prefix and name in STATE)
                 (self.shown if done else self.left).append(prefix + name)
         if self._add("contact", data, "nacon", "count", 1, False):
             self.left.remove("nacon")
@@ -171,7 +171,7 @@ class Worlds:
             if prefix + field.name in ("efc.J", *_OTHER):  # which are not written, and have several forms
                 continue
             rows = owner == "model" and wanted.shape[:1] == ("*",) and array.shape[0] == 0 and all(array.shape[1:])
-            if not array.size and field.name not in _STATE and not rows:
+            if not array.size and field.name not in STATE and not rows:
                 continue  # mujoco_warp does not allocate what the model does not need
             named = [size if isinstance(size, int) else self._size(size) for size in wanted.shape]
             same = len(named) == array.ndim and all(size is None or size == n for size, n in zip(named, array.shape))

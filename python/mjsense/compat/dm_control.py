@@ -18,7 +18,7 @@ import mujoco
 from dm_control.mujoco import engine, wrapper  # pyright: ignore[reportMissingImports]
 
 from mjsense.compat._opengl import Look
-from mjsense.rendering.renderer import Renderer
+from mjsense.sim.renderer import Renderer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

@@ -23,7 +23,7 @@ except ModuleNotFoundError as error:
     raise ModuleNotFoundError(message, name=error.name) from error
 
 from mjsense.compat._opengl import Look, depth_buffer
-from mjsense.rendering.renderer import Renderer, camera_of_name
+from mjsense.sim.renderer import Renderer, camera_of_name
 
 
 class Viewer(OffScreenViewer):

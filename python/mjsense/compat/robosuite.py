@@ -16,7 +16,7 @@ import numpy as np
 import robosuite.environments.base as base  # pyright: ignore[reportMissingImports]
 
 from mjsense.compat._opengl import Look, depth_buffer
-from mjsense.rendering.renderer import Renderer
+from mjsense.sim.renderer import Renderer
 
 
 class RenderContext:

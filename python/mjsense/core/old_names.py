@@ -24,94 +24,24 @@ OLD_NAMES = {
     "mjsense.errors": "mjsense.core.errors",
     "mjsense.export": "mjsense.exporting",
     "mjsense.observations": "mjsense.sensors.observations",
+    "mjsense.rendering": "mjsense.sim",
     "mjsense.rl": "mjsense.tasks.rl",
     "mjsense.rl.rsl": "mjsense.tasks.rl.rsl",
     "mjsense.rl.sb3": "mjsense.tasks.rl.sb3",
     "mjsense.teleoperation": "mjsense.tasks.teleoperation",
 }
 
-MOVED = {
-    "mjsense.dataset": (
-        "Deviation",
-        "Episode",
-        "EpisodeCheck",
-        "EpisodeQuality",
-        "RenderProgress",
-        "RenderSummary",
-        "ReplayReport",
-        "SensorCheck",
-        "Stream",
-        "Video",
-    ),
-    "mjsense.exporting": (
-        "export_lerobot",
-        "export_lerobot21",
-        "export_mcap",
-        "export_rerun",
-        "export_rlds",
-        "export_robomimic",
-        "export_zarr",
-    ),
-    "mjsense.recording": ("RecordVectorEpisodes",),
-    "mjsense.scene": ("Entity",),
-    "mjsense.sensors": (
-        "BuiltinSensor",
-        "CameraData",
-        "CameraImageSensor",
-        "CameraParameterSensor",
-        "CameraSensor",
-        "CameraVizCfg",
-        "ContactData",
-        "ContactSensor",
-        "ContactVizCfg",
-        "DebugShapes",
-        "EnvStatesSensor",
-        "FunctionSensor",
-        "GraspStateSensor",
-        "ImagePointsSensor",
-        "ImuAxis",
-        "ImuData",
-        "ImuModel",
-        "ImuSensor",
-        "JointPositionSensor",
-        "JointVelocitySensor",
-        "LidarSensor",
-        "NativeSensor",
-        "ObservationPipeline",
-        "PoseSensor",
-        "RayCastData",
-        "RayCastSensor",
-        "RayCastVizCfg",
-        "RobotBasePoseSensor",
-        "SceneEntityCfg",
-        "SensorCfg",
-        "SensorData",
-        "SensorSpec",
-        "TcpPoseSensor",
-        "TerrainHeightSensor",
-        "replace",
-    ),
-    "mjsense.sim": ("Attached",),
-    "mjsense.tasks": (
-        "MoveGroup",
-        "RecordProgress",
-        "RecordSummary",
-        "RobotCamera",
-        "SceneHeadlightCfg",
-        "SceneMoodCfg",
-        "SceneObjectCfg",
-        "SceneRegionCfg",
-        "SceneRobotCfg",
-        "SceneSkyCfg",
-        "SceneVaryCfg",
-        "TaskEnv",
-        "TaskVectorEnv",
-        "Teleoperation",
-        "WorldState",
-    ),
-    "mjsense.viewer": ("Viewer",),
-}
-"""Public names that were at the top of ``mjsense``, by the module that has them now."""
+ROOMS = (
+    "mjsense.tasks",
+    "mjsense.sensors",
+    "mjsense.dataset",
+    "mjsense.exporting",
+    "mjsense.recording",
+    "mjsense.scene",
+    "mjsense.sim",
+    "mjsense.viewer",
+)
+"""Modules whose public names ``mjsense`` has too, with a warning. If two of them have a name, it is that of the first one."""
 
 
 class _OldModule(ModuleType):
@@ -142,7 +72,7 @@ def moved_name(name: str) -> Any:
     Raises:
         AttributeError: There is no such name.
     """
-    room = next((room for room, names in MOVED.items() if name in names), None)
+    room = next((room for room in ROOMS if name in importlib.import_module(room).__all__), None)
     if room is None:
         near = "" if name.startswith("_") else did_you_mean(name, sys.modules["mjsense"].__all__)
         raise AttributeError(f"module 'mjsense' has no attribute '{name}'{near}")

@@ -5,11 +5,11 @@ to a file."""
 from mjsense.dataset.dataset import Dataset
 from mjsense.dataset.deviation import Deviation
 from mjsense.dataset.episode import Episode
-from mjsense.dataset.episode_rows import Stream
 from mjsense.dataset.quality import EpisodeQuality
 from mjsense.dataset.rendering import RenderProgress, RenderSummary, render
 from mjsense.dataset.replay_check import EpisodeCheck, ReplayReport, check_replay, replay
 from mjsense.dataset.sensor_check import SensorCheck
+from mjsense.dataset.streams import Stream
 from mjsense.dataset.video import Video
 
 __all__ = [

@@ -14,11 +14,12 @@ from pathlib import Path
 
 from mjsense.dataset import playback
 from mjsense.dataset.episode import Episode
-from mjsense.dataset.episode_rows import NUMBERS, REPLAY, VIDEOS, Store, is_json
+from mjsense.dataset.episode_rows import Store
 from mjsense.dataset.files import batches, entries_of
 from mjsense.dataset.hdf5 import Group, open_h5
 from mjsense.dataset.json_rows import decode
 from mjsense.dataset.render_cameras import recorded_cameras
+from mjsense.dataset.streams import NUMBERS, REPLAY, VIDEOS, is_json
 from mjsense.dataset.video_decoder import Packets, have_av
 
 _REFUSALS = (ValueError, LookupError, OSError, RuntimeError, ImportError)

@@ -20,10 +20,11 @@ from mjsense.core.arguments import checked
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.dataset import statistics
 from mjsense.dataset.episode import Episode
-from mjsense.dataset.episode_rows import LARGE_ROW, REPLAY, Store, Stream, given_name, is_mask
+from mjsense.dataset.episode_rows import Store
 from mjsense.dataset.files import entries_of
 from mjsense.dataset.places import printable
 from mjsense.dataset.remote import resolved
+from mjsense.dataset.streams import LARGE_ROW, REPLAY, Stream, given_name, is_mask
 
 _PROBED = 16  # episodes of each recording whose JSON rows are read to know their leaves; about 10 ms each
 

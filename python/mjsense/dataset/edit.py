@@ -16,9 +16,10 @@ from mjsense.core.new_output import new_output
 from mjsense.core.optional import optional
 from mjsense.dataset.dataset import Dataset
 from mjsense.dataset.episode import Episode
-from mjsense.dataset.episode_rows import VIDEOS
-from mjsense.dataset.hdf5 import open_h5, text_of
+from mjsense.dataset.hdf5 import open_h5
+from mjsense.dataset.hdf5_values import text_of
 from mjsense.dataset.places import open_plain, plain_name
+from mjsense.dataset.streams import VIDEOS
 
 
 @checked

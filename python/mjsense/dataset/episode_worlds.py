@@ -31,21 +31,6 @@ _RENUMBERED = {
     "site": (mujoco_names.Obj.SITE, "nsite"),
 }
 
-_PARTS = [
-    "time",
-    "qpos",
-    "qvel",
-    "act",
-    "qacc_warmstart",
-    "ctrl",
-    "qfrc_applied",
-    "xfrc_applied",
-    "eq_active",
-    "mocap_pos",
-    "mocap_quat",
-    "userdata",
-]
-
 
 class _ArchivedSceneCfg(SceneCfg):
     """A scene whose base is the model of an archive, of which nothing is read from disk."""
@@ -177,7 +162,7 @@ class OwnStepper(playback.Stepper):
 
     def part(self, i: int) -> tuple[str, int]:
         sim = self._sim
-        for name in _PARTS:
+        for name in mujoco_names.STATE:
             values = sim._component(name)
             inside = i - (values.ctypes.data - sim.state.ctypes.data) // sim.state.itemsize
             if 0 <= inside < values.size:  # of the only world

@@ -12,7 +12,8 @@ from typing import Any, Protocol
 from mjsense.core.input_files import missing
 from mjsense.dataset import index
 from mjsense.dataset.description import Description
-from mjsense.dataset.hdf5 import Group, Rows, open_h5
+from mjsense.dataset.hdf5 import Group, open_h5
+from mjsense.dataset.hdf5_rows import Rows
 from mjsense.dataset.limits import DESCRIPTION_BYTES
 from mjsense.dataset.places import plain_folder, printable
 

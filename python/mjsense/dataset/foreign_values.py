@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from mjsense.core.input_files import unreadable
-from mjsense.dataset.hdf5 import Group, Rows
+from mjsense.dataset.hdf5 import Group
+from mjsense.dataset.hdf5_rows import Rows
 
 MAX_JSON = 16 << 20  # bytes
 MAX_BYTES = 1 << 30  # of one array, or of one file that is read as a whole

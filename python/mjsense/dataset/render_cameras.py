@@ -16,9 +16,9 @@ from mjsense.core.declared_fields import declared_fields
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.core.rotations import quaternions_of
 from mjsense.dataset.description import is_known_thing, printable
-from mjsense.dataset.episode_rows import VIDEOS
 from mjsense.dataset.hdf5 import open_h5
 from mjsense.dataset.playback import where
+from mjsense.dataset.streams import VIDEOS
 from mjsense.sensors.configs import CameraSensorCfg
 from mjsense.sensors.core_sensors import CameraImageSensor, CameraParameterSensor
 

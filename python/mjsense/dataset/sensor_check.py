@@ -19,13 +19,15 @@ from mjsense.dataset import bounded_json, json_rows, render_cameras
 from mjsense.dataset.dataset import Dataset, by_house
 from mjsense.dataset.description import named_file
 from mjsense.dataset.deviation import Deviation
-from mjsense.dataset.episode_rows import VIDEOS
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
-from mjsense.dataset.hdf5 import Rows, open_h5, text_of
+from mjsense.dataset.hdf5 import open_h5
+from mjsense.dataset.hdf5_rows import Rows
+from mjsense.dataset.hdf5_values import text_of
 from mjsense.dataset.limits import TEXT_BYTES
 from mjsense.dataset.model_fields import ReplayInputs
 from mjsense.dataset.places import open_plain
 from mjsense.dataset.playback import fields_of, inputs_of
+from mjsense.dataset.streams import VIDEOS
 from mjsense.recording.ffmpeg import use_installed_ffmpeg
 from mjsense.recording.recorder import recorded_sensors
 from mjsense.scene.physics_options import PREFIX

@@ -25,8 +25,9 @@ from mjsense import _core
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.dataset import Dataset, Episode, bounded_json
 from mjsense.dataset.places import is_plain_name
+from mjsense.tasks.making import make_vec
 from mjsense.tasks.recording import record
-from mjsense.tasks.vector import TaskVectorEnv, make_vec
+from mjsense.tasks.vector import TaskVectorEnv
 
 FILE, STARTS = "benchmark.json", "starts"
 PREFIX, _SHIPPED = "benchmark:", Path(__file__).parent / "shipped"

@@ -12,7 +12,8 @@ from mjsense import _core
 from mjsense.evaluation.benchmarks import DEFAULTS, IMAGE_OPTIONS, Benchmark, started
 from mjsense.evaluation.molmospaces_benchmark import dataset_of
 from mjsense.evaluation.molmospaces_episodes import FILE, PLACING, ROBOTS, TASKS
-from mjsense.tasks.vector import TaskVectorEnv, make_vec
+from mjsense.tasks.making import make_vec
+from mjsense.tasks.vector import TaskVectorEnv
 
 
 def export_molmospaces(benchmark: str | Path | Benchmark, out: str | Path, num_worlds: int = 4) -> int:

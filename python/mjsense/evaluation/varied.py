@@ -21,8 +21,8 @@ from mjsense.evaluation.playing import play
 from mjsense.evaluation.report import Results
 from mjsense.evaluation.rows import group_of, key_of
 from mjsense.evaluation.summary import rate_text
+from mjsense.tasks.making import make_vec
 from mjsense.tasks.robot import Robot
-from mjsense.tasks.vector import make_vec
 
 UNCHANGED = "unchanged"
 _TRIED = 4  # episodes in which a factor must change something

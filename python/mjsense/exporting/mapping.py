@@ -18,8 +18,8 @@ from mjsense.core.arguments import checked
 from mjsense.core.errors import UnknownNameError
 from mjsense.core.input_files import read_toml
 from mjsense.dataset import Dataset, Episode, Stream, Video
-from mjsense.dataset.episode_rows import LARGE_ROW, VIDEOS, given_name
 from mjsense.dataset.files import is_unfinished
+from mjsense.dataset.streams import LARGE_ROW, VIDEOS, given_name
 from mjsense.sensors.row_declarations import is_image
 
 _OF_STEPS = ("actions/", "rewards", "success", "fail", "terminated", "truncated")

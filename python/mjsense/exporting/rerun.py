@@ -20,7 +20,7 @@ import numpy as np
 
 from mjsense.core.png import png_of
 from mjsense.dataset import Episode
-from mjsense.dataset.episode_rows import VIDEOS
+from mjsense.dataset.streams import VIDEOS
 from mjsense.exporting.images import depth_unit, depth_videos, to_uint16
 from mjsense.exporting.mapping import Source
 from mjsense.exporting.output import join_folders, needs

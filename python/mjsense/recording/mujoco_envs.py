@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mjsense.rendering.renderer import Renderer
 from mjsense.sim.attached import Attached
+from mjsense.sim.renderer import Renderer
 
 _OWNERS = ("", "robot_env", "point_env", "ant_env", "sim", "env.sim", "physics", "_env.physics")
 """Attributes of environments that have the MuJoCo `model` and `data`."""

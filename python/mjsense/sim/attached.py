@@ -12,6 +12,7 @@ import numpy as np
 from mjsense import _core
 from mjsense.core.arguments import KnownAttributes, Seed, checked
 from mjsense.core.errors import UnknownNameError, did_you_mean
+from mjsense.core.mujoco_names import STATE
 from mjsense.core.one_thread import OneThread, guarded
 from mjsense.scene.randomizable import check_randomizable
 from mjsense.scene.scene import Scene
@@ -19,21 +20,6 @@ from mjsense.sensors.configs import SceneCfg
 from mjsense.sim import foreign_model
 from mjsense.sim.simulation import Simulation
 
-_STATE = (
-    "time",
-    "qpos",
-    "qvel",
-    "act",
-    "ctrl",
-    "qfrc_applied",
-    "xfrc_applied",
-    "eq_active",
-    "mocap_pos",
-    "mocap_quat",
-    "qacc_warmstart",
-    "userdata",
-)
-"""Fields of mjData that determine what sensors measure."""
 _ELEMENTS = (
     ("geom_xpos", "ngeom", "geoms"),
     ("site_xpos", "nsite", "sites"),
@@ -87,7 +73,7 @@ class Attached(KnownAttributes):
         self._sim = Simulation(scene, len(self.datas), decimation, threads, seed)
         state = self._sim.state
         self._columns: dict[str, slice] = {}
-        for name in _STATE:
+        for name in STATE:
             part = self._sim._component(name)
             start = (_address(part) - _address(state)) // state.itemsize if part.size else 0
             self._columns[name] = slice(start, start + part[0].size)

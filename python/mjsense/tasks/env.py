@@ -11,8 +11,7 @@ import numpy as np
 from mjsense.core.arguments import Seed, checked
 from mjsense.scene.scene import Scene
 from mjsense.scene.written_values import numbers
-from mjsense.tasks.parts import Robots, Tasks
-from mjsense.tasks.vector import TaskVectorEnv, _made_again, _row, make_vec
+from mjsense.tasks.vector import TaskVectorEnv, _row
 
 
 @checked
@@ -37,7 +36,7 @@ class TaskEnv(gymnasium.Env):
 
     def __reduce__(self) -> Any:
         """A copy, or what is pickled, is a new environment with the same arguments, in which no episode has begun."""
-        return _made_again, (TaskEnv, self.worlds._copyable()), {"spec": self.spec}
+        return self.worlds._reduced(TaskEnv, self.spec)
 
     def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
         """Starts the next episode; with a seed, the first episode of that seed."""
@@ -103,13 +102,3 @@ def _about(infos: dict[str, Any]) -> dict[str, Any]:
     """Which episode the world plays: seed, number, house, instruction and object."""
     values = {name: rows[0] for name, rows in infos["episode_info"].items() if not name.startswith("_")}
     return {name: value if name in ("instruction", "object", "seed") else int(value) for name, value in values.items()}
-
-
-@checked
-def make(task: Tasks = "pick", robot: Robots | None = None, **options: Any) -> TaskEnv:
-    """Creates a gymnasium environment of a task with one world. The options are those of :func:`make_vec` except ``num_envs`` and
-    ``autoreset_mode``: call ``reset()`` after the end of an episode."""
-    for word in ("num_envs", "autoreset_mode"):
-        if word in options:
-            raise TypeError(f"make() has no {word}: that is make_vec()'s")
-    return TaskEnv(make_vec(task, robot, num_envs=1, autoreset_mode="disabled", **options))

@@ -19,8 +19,8 @@ def register(task: str, robot: str | None = None) -> None:
     kwargs = {"task": task} if robot is None else {"task": task, "robot": robot}
     gymnasium.register(
         env_id(task, robot),
-        entry_point="mjsense.tasks.env:make",
-        vector_entry_point="mjsense.tasks.vector:make_vec",
+        entry_point="mjsense.tasks.making:make",
+        vector_entry_point="mjsense.tasks.making:make_vec",
         kwargs=kwargs,
         order_enforce=False,
     )

@@ -12,8 +12,9 @@ from mjsense._core import robot_names
 from mjsense.core.errors import UnknownNameError
 from mjsense.sensors.configs import SceneFileCfg
 from mjsense.tasks.env import TaskEnv
+from mjsense.tasks.making import make_vec
 from mjsense.tasks.task import task_names
-from mjsense.tasks.vector import TaskVectorEnv, make_vec
+from mjsense.tasks.vector import TaskVectorEnv
 from mjsense.viewer.pictures import point_streams
 from mjsense.viewer.poses import POSE, PoseStream
 from mjsense.viewer.source import Control, LiveSource

@@ -9,7 +9,7 @@ import numpy as np
 
 from mjsense.core.representations import plain
 from mjsense.dataset import Dataset, Episode
-from mjsense.dataset.episode_rows import VIDEOS
+from mjsense.dataset.streams import VIDEOS
 from mjsense.sensors.drawing import DebugShapes
 from mjsense.viewer.camera import first_view
 from mjsense.viewer.curves import MAX_CURVES, Curves, StreamInfo

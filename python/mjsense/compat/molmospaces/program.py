@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mjsense.compat._opengl import Look
-from mjsense.rendering.renderer import Renderer, camera_of_name
+from mjsense.sim.renderer import Renderer, camera_of_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -15,9 +15,10 @@ from mjsense.evaluation.remote.adapter import ACTIONS, EPISODE, PROMPT, SEED
 from mjsense.evaluation.remote.adapters import adapter_of
 from mjsense.evaluation.remote.served_adapter import ServedAdapter
 from mjsense.sensors.nested_streams import Streams, choose_streams, nest
+from mjsense.tasks.making import make_vec
 from mjsense.tasks.policy import FunctionPolicy
 from mjsense.tasks.task import group_slices
-from mjsense.tasks.vector import TaskVectorEnv, make_vec
+from mjsense.tasks.vector import TaskVectorEnv
 
 
 class BadRequest(ValueError):

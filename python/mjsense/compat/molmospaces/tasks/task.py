@@ -15,7 +15,8 @@ from mjsense.compat.peer.config import PeerConfig, PeerTaskConfig
 from mjsense.sensors.nested_streams import nest, stream_path
 from mjsense.sensors.suite import SensorSuite
 from mjsense.sim.simulation import Simulation
-from mjsense.tasks.vector import TaskVectorEnv, make_vec
+from mjsense.tasks.making import make_vec
+from mjsense.tasks.vector import TaskVectorEnv
 
 
 class TaskConfig(PeerTaskConfig):

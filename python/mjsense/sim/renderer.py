@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import os
-import re
 import warnings
 from concurrent.futures import ThreadPoolExecutor, wait
 from queue import Empty, SimpleQueue
@@ -12,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjsense import _core
 from mjsense.core.arguments import OutputArray, checked
 from mjsense.core.errors import nearest
 from mjsense.core.one_thread import OneThread, guarded
-from mjsense.rendering import scene_layout
+from mjsense.sim.scene_drawer import SceneDrawer
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -24,34 +22,12 @@ if TYPE_CHECKING:
     import mujoco
 
 # fmt: off
-_MODEL_ARRAYS = (
-    "mesh_vertadr", "mesh_vertnum", "mesh_faceadr", "mesh_facenum", "mesh_normaladr", "mesh_normalnum", "mesh_texcoordadr",
-    "mesh_texcoordnum", "mesh_graphadr", "mesh_vert", "mesh_normal", "mesh_texcoord", "mesh_face", "mesh_facenormal",
-    "mesh_facetexcoord",
-    "mesh_graph", "hfield_adr", "hfield_nrow", "hfield_ncol", "hfield_size", "hfield_data", "skin_vertadr", "skin_vertnum",
-    "skin_texcoordadr", "skin_faceadr", "skin_facenum", "skin_vert", "skin_texcoord", "skin_face", "tex_adr", "tex_type",
-    "tex_width",
-    "tex_height", "tex_nchannel", "tex_colorspace", "tex_data", "mat_texid", "mat_texuniform", "mat_texrepeat",
-    "mat_metallic", "mat_roughness", "light_type", "light_texid", "light_active",
-)
-"""The model's arrays that an image depends on and that are not in the abstract scene."""
-
-_SCENE_ARRAYS = (
-    "flexedgeadr", "flexedgenum", "flexedge", "flexvertadr", "flexvertnum", "flexfaceadr", "flexfaceused", "flexvert", "flexface",
-    "flexnormal", "flextexcoord", "skinfacenum", "skinvertadr", "skinvertnum", "skinvert", "skinnormal",
-)
-
 _SIZES = (
     "nq", "nv", "nbody", "ngeom", "nsite", "ncam", "nlight", "nmesh", "nskin", "nflex", "nflexvert", "ntendon", "nu", "ntex",
     "nmat",
 )
 # fmt: on
-
-# Flags of renderer.scene.flags (mjtRndFlag) by their effect here.
-_REFUSED_IF_SET = ("mjRND_WIREFRAME", "mjRND_ADDITIVE", "mjRND_DEPTH", "mjRND_SEGMENT", "mjRND_IDCOLOR")
-_REFUSED_IF_CLEAR = ("mjRND_CULL_FACE",)
-_SHOWN = ("mjRND_SHADOW", "mjRND_REFLECTION", "mjRND_SKYBOX", "mjRND_HAZE", "mjRND_FOG")
-
+"""Sizes of the model that must stay the same, and that data must have."""
 
 _KINDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "rgb": (np.uint8, (3,)),
@@ -64,6 +40,10 @@ _NO_POSES = "`data` has no poses yet, and no geoms are drawn: call mujoco.mj_for
 _NO_CAMERA = (
     "the image is empty, because its camera has no pose: call mujoco.mj_forward(model, data) and update_scene(data) before"
 )
+
+
+def _sizes_of(model: mujoco.MjModel) -> tuple[int, ...]:
+    return tuple(getattr(model, name) for name in _SIZES)
 
 
 def _has_poses(data: mujoco.MjData) -> bool:
@@ -153,58 +133,14 @@ class Renderer:
         self._batch_guard = OneThread("")
         self._warned: set[str] = set()
         self._mujoco = mujoco
-        self._version = tuple(int(x) for x in mujoco.mj_versionString().split(".")[:2])
         self._model = model
         self._height, self._width = self._checked_size(height, width)
         self._scene = scene
         self._scene_option = mujoco.MjvOption()
-        self._fixed_camera = -1
-        """Id of the camera of the last ``update_scene``; -1 if it was not one of the model."""
         self._depth = self._segmentation = self._point_lights = False
         self._shading, self._environment, self._samples_per_pixel = "classic", "model", 64
-        self._sizes = self._sizes_of(model)
-        flag = mujoco.mjtRndFlag
-        self._flags = {
-            name: int(getattr(flag, name)) for name in (*_SHOWN, *_REFUSED_IF_SET, *_REFUSED_IF_CLEAR) if hasattr(flag, name)
-        }
-        """Indices into the scene's flags."""
-        self._native: Any = self._make_native()
-
-    def _make_native(self) -> Any:
-        model, scene = self._model, self._scene
-        arrays = {name: getattr(model, name) for name in _MODEL_ARRAYS if hasattr(model, name)}
-        if arrays["tex_adr"].dtype != np.int64:
-            arrays["tex_adr"] = arrays["tex_adr"].astype(np.int64)
-        arrays |= {name: getattr(model, name) for name in _core.scene_index_fields() if hasattr(model, name)}
-        soft = {name: getattr(scene, name) for name in _SCENE_ARRAYS}
-        self._alive = (arrays, soft)  # the native renderer reads their memory
-        quality, map_, rgba, extent = model.vis.quality, model.vis.map, model.vis.rgba, float(model.stat.extent)
-        settings = {
-            "samples": max(1, int(quality.offsamples)),
-            "shadows": bool(quality.shadowsize > 0),
-            "shadow_clip": float(extent * map_.shadowclip),
-            "shadow_scale": float(map_.shadowscale),
-            "shadow_near": float(extent * map_.znear),
-            "haze": float(map_.haze),
-            "haze_rgb": tuple(float(x) for x in rgba.haze[:3]),
-            "fog_start": extent * map_.fogstart,
-            "fog_slope": 1 / (extent * max(map_.fogend - map_.fogstart, 1e-6)),
-            "fog_rgb": tuple(float(x) for x in rgba.fog[:3]),
-            "line_width": float(model.vis.global_.linewidth),
-            # 3.12 wraps 2D textures around spheres, cylinders and so on, and repeats those of meshes; earlier versions project
-            # them along z.
-            "projected_textures": self._version < (3, 12),
-            "point_lights_at_camera": self._version < (3, 12),
-            "sized_soft_textures": self._version < (3, 13),
-        }
-        # The geoms of mujoco's class: dm_control's subclass has only those in use, at this moment possibly none.
-        geoms = self._mujoco.MjvScene.geoms.fget(scene)
-        lights, cameras = scene.lights, scene.camera
-        first = {"geoms": geoms[0], "lights": lights[0], "left_camera": cameras[0], "right_camera": cameras[1]}
-        where = {name: scene_layout.address(element.pos) for name, element in first.items()}
-        where["geom_stride"] = scene_layout.address(geoms[1].pos) - where["geoms"]
-        where["light_stride"] = scene_layout.address(lights[1].pos) - where["lights"]
-        return _core.SceneRenderer(arrays, settings, scene_layout.layouts(), where, soft)
+        self._sizes = _sizes_of(model)
+        self._drawer: SceneDrawer | None = SceneDrawer(model, scene)
 
     @staticmethod
     def _checked_size(height: int, width: int) -> tuple[int, int]:
@@ -237,6 +173,10 @@ class Renderer:
     def _look(self) -> tuple[str, str, int]:
         return self._shading, self._environment, self._samples_per_pixel
 
+    def _set_look(self, *look: Any) -> None:
+        self._opened().native.set_shading(*look)
+        self._shading, self._environment, self._samples_per_pixel = look
+
     @property
     def shading(self) -> str:
         """``"classic"``, the default: MuJoCo's light model; ``"pbr"``: physically based colours, as those of cameras with
@@ -245,8 +185,7 @@ class Renderer:
 
     @shading.setter
     def shading(self, value: str) -> None:
-        self._opened().set_shading(value, self._environment, self._samples_per_pixel)
-        self._shading = value
+        self._set_look(value, self._environment, self._samples_per_pixel)
 
     @property
     def environment(self) -> str:
@@ -256,8 +195,7 @@ class Renderer:
 
     @environment.setter
     def environment(self, value: str) -> None:
-        self._opened().set_shading(self._shading, value, self._samples_per_pixel)
-        self._environment = value
+        self._set_look(self._shading, value, self._samples_per_pixel)
 
     @property
     def samples_per_pixel(self) -> int:
@@ -266,8 +204,7 @@ class Renderer:
 
     @samples_per_pixel.setter
     def samples_per_pixel(self, value: int) -> None:
-        self._opened().set_shading(self._shading, self._environment, value)
-        self._samples_per_pixel = value
+        self._set_look(self._shading, self._environment, value)
 
     @property
     def height(self) -> int:
@@ -295,15 +232,10 @@ class Renderer:
     def disable_segmentation_rendering(self) -> None:
         self._segmentation = False
 
-    @staticmethod
-    def _sizes_of(model: mujoco.MjModel) -> tuple[int, ...]:
-        return tuple(getattr(model, name) for name in _SIZES)
-
-    def _opened(self) -> Any:
-        native = self._native
-        if native is None:
+    def _opened(self) -> SceneDrawer:
+        if self._drawer is None:
             raise RuntimeError("Renderer: used after close(); make a new one")
-        return native
+        return self._drawer
 
     def _warn(self, text: str) -> None:
         """Warns once, at the line that calls the public method that calls this."""
@@ -321,7 +253,7 @@ class Renderer:
             raise AttributeError(f"Renderer has no attribute '{name}'{gl if name in ('_mjr_context', '_gl_context') else ''}")
 
     def _check_sizes(self, model: mujoco.MjModel, what: str) -> None:
-        sizes = self._sizes_of(model)
+        sizes = _sizes_of(model)
         if sizes == self._sizes:
             return
         name, found, expected = next(row for row in zip(_SIZES, sizes, self._sizes) if row[1] != row[2])
@@ -367,17 +299,17 @@ class Renderer:
 
     def check_data(self, data: mujoco.MjData) -> None:
         """Raises the errors of ``update_scene`` for `data` and the model, for callers that update the scene themselves."""
-        self._opened()
+        drawer = self._opened()
         self._check_sizes(self._model, "the model has changed")
         owner = getattr(data, "model", self._model)
         if owner is not self._model:
             self._check_sizes(owner, "`data` belongs to another model")
-        self._native.check_indices()
+        drawer.native.check_indices()
 
     def _update(self, data: mujoco.MjData, camera: int | str | mujoco.MjvCamera, scene_option: mujoco.MjvOption | None) -> None:
         self.check_data(data)
         mujoco, view = self._mujoco, self._camera(camera)
-        self._fixed_camera = view.fixedcamid if view.type == mujoco.mjtCamera.mjCAMERA_FIXED else -1
+        self._opened().fixed_camera = view.fixedcamid if view.type == mujoco.mjtCamera.mjCAMERA_FIXED else -1
         # MuJoCo centres infinite planes at the camera that the scene had before; without this call an image would depend on it.
         mujoco.mjv_updateCamera(self._model, data, view, self._scene)
         if any(camera.frustum_near < 1e-15 for camera in self._scene.camera):  # for which mjv_updateScene ends the process
@@ -408,7 +340,7 @@ class Renderer:
                 drawn.
         """
         with self._guard:
-            self._opened()
+            drawer = self._opened()
             kind = "depth" if self._depth else "segmentation" if self._segmentation else "rgb"
             dtype, channels = _KINDS[kind]
             shape = (self._height, self._width, *channels)
@@ -416,7 +348,7 @@ class Renderer:
                 raise ValueError(f"Expected `out.shape == {shape}` for {kind} rendering. Got `out.shape={out.shape}` instead.")
             direct = out is not None and out.dtype == dtype and out.flags.c_contiguous and out.flags.writeable
             image = out if out is not None and direct else np.empty(shape, dtype)
-            drawn = self._draw(**{kind: image})
+            drawn = drawer.draw(**{kind: image}, point_lights=self._point_lights)
             if out is not None and not direct:
                 np.copyto(out, image, casting="unsafe")
         if not drawn:
@@ -438,10 +370,10 @@ class Renderer:
             New arrays by kind.
         """
         with self._guard:
-            self._opened()
+            drawer = self._opened()
             size = self._checked_size(self._height if height is None else height, self._width if width is None else width)
             images = {kind: self._empty(kind, *size) for kind in kinds}
-            drawn = self._draw(**images)
+            drawn = drawer.draw(**images, point_lights=self._point_lights)
         if not drawn:
             self._warn(_NO_CAMERA)
         return images
@@ -481,12 +413,10 @@ class Renderer:
         def draw(pool: _Pool, index: int) -> None:
             renderer = pool.take()
             try:
-                renderer._point_lights = self._point_lights
                 if renderer._look != self._look:
-                    renderer._environment, renderer._samples_per_pixel = self._environment, self._samples_per_pixel
-                    renderer.shading = self._shading
+                    renderer._set_look(*self._look)
                 renderer._update(datas[index], each[index], scene_option)
-                renderer._draw(rgb=images[index])
+                renderer._opened().draw(rgb=images[index], point_lights=self._point_lights)
             except ValueError as error:
                 raise ValueError(f"{error} (datas[{index}])") from None
             finally:
@@ -521,8 +451,8 @@ class Renderer:
         Not needed after changes of whole textures, height fields or meshes, which are detected; a change of a small part of a
         large one may be missed.
         """
-        self._opened().reload()
-        self.shading = self._shading  # a skybox or an image light may have changed
+        self._opened().native.reload()
+        self._set_look(*self._look)  # a skybox or an image light may have changed
 
     def _empty(self, kind: str, height: int, width: int) -> np.ndarray:
         if kind not in _KINDS:
@@ -530,72 +460,11 @@ class Renderer:
         dtype, channels = _KINDS[kind]
         return np.empty((height, width, *channels), dtype)
 
-    def _draw(
-        self, rgb: np.ndarray | None = None, depth: np.ndarray | None = None, segmentation: np.ndarray | None = None
-    ) -> bool:
-        """Returns False if the scene has no camera, so that nothing can be seen."""
-        native, scene = self._opened(), self._scene
-        if not 0 <= scene.ngeom <= scene.maxgeom:
-            raise ValueError(f"Renderer: scene.ngeom is {scene.ngeom}: must be in [0, {scene.maxgeom}], which max_geom has set")
-        values = scene.flags.tolist()
-        flags = {name: values[index] for name, index in self._flags.items()}
-        if rgb is not None:
-            self._check_scene(flags)
-        shown = [bool(flags[name]) for name in _SHOWN]
-        shown += [bool(x) for x in (scene.flexvertopt, scene.flexedgeopt, scene.flexskinopt)]
-        shown.append(self._point_lights)
-        images = [image for image in (rgb, depth, segmentation) if image is not None]
-        height, width = images[0].shape[:2] if images else (self._height, self._width)
-        memory = [0 if image is None else scene_layout.address(image) for image in (rgb, depth, segmentation)]
-        try:
-            native.render(scene.ngeom, scene.nlight, tuple(shown), width, height, *memory)
-        except ValueError as error:
-            if any(eye.forward.any() and eye.up.any() for eye in scene.camera):
-                raise ValueError(f"Renderer: {self._with_names(str(error))}") from None
-            for image, nothing in ((rgb, 0), (depth, self._model.vis.map.zfar * self._model.stat.extent), (segmentation, -1)):
-                if image is not None:
-                    image.fill(nothing)
-            return False
-        return True
-
-    def _with_names(self, message: str) -> str:
-        """The message with names instead of MuJoCo's object types and ids."""
-        mujoco, model, scene = self._mujoco, self._model, self._scene
-
-        def named(kind: int, id: int) -> str:
-            if id < 0 or not (text := mujoco.mju_type2Str(kind)):
-                return "(decoration)"
-            return f"({text} '{mujoco.mj_id2name(model, kind, id) or ''}', id {id})"
-
-        def light(found: re.Match[str]) -> str:
-            one = scene.lights[int(found[1])]
-            if not hasattr(one, "id") or one.headlight:  # MuJoCo 3.3 has no ids of lights
-                return found[0]
-            return f"{found[0]} {named(mujoco.mjtObj.mjOBJ_LIGHT.value, one.id)}"
-
-        message = re.sub(r"\(object type (\d+), id (-?\d+)\)", lambda found: named(int(found[1]), int(found[2])), message)
-        message = re.sub(r"light (\d+) of the scene", light, message)
-        if self._fixed_camera >= 0:
-            camera = named(mujoco.mjtObj.mjOBJ_CAMERA.value, self._fixed_camera)
-            message = message.replace("the scene's camera", f"the scene's camera {camera}")
-        return message
-
-    def _check_scene(self, flags: dict[str, int]) -> None:
-        """Raises ValueError for settings of the scene, with these flags, that change an image and are not supported."""
-        scene = self._scene
-        for names, refused in ((_REFUSED_IF_SET, 1), (_REFUSED_IF_CLEAR, 0)):
-            for name in names:
-                if name in flags and bool(flags[name]) == refused:
-                    raise ValueError(f"Renderer: scene.flags[{name}] = {refused} is not supported")
-        for name in ("stereo", "enabletransform", "framewidth"):
-            if getattr(scene, name):
-                raise ValueError(f"Renderer: scene.{name} = {getattr(scene, name)} is not supported")
-
     def close(self) -> None:
         """Frees the renderer's memory, after the calls of other threads. The renderer is also a context manager that does this at
         its end."""
         with self._guard.lock:
-            self._native = None
+            self._drawer = None
         with self._batch_guard.lock:
             batch, self._batch = self._batch, None
         if batch is not None and batch.process == os.getpid():
