@@ -186,7 +186,7 @@ def test_an_interrupted_batch_leaves_no_image_for_later(monkeypatch):
         raise KeyboardInterrupt
 
     with mjs.Renderer(model, 240, 320) as renderer:
-        monkeypatch.setattr(sys.modules["mjsense.rendering.renderer"], "wait", interrupted)
+        monkeypatch.setattr(sys.modules["mjsense.sim.renderer"], "wait", interrupted)
         with pytest.raises(KeyboardInterrupt):
             renderer.render_batch([data] * 100, "front")
         assert len(submitted) == 100 and all(one.running() or one.done() for one in submitted)
