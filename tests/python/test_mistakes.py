@@ -296,6 +296,10 @@ CASES = {
     "file of a robot": (lambda u: mjs.Robot("x/robot.toml"), ["x/robot.toml", "no such file"]),
     "port": (lambda u: mjs.view("pick", port=65536), ["port is 65536", "[0, 65535]"]),
     "stream of a plot": (lambda u: mjs.plot("pick", ["tcp_pos"], seconds=0.1), ["no stream 'tcp_pos'", "did you mean 'tcp_pose'?"]),
+    "a picture without a format": (lambda u: mjs.plot(u.data, ["rewards"], out=u.tmp / "p"), ["does not end in the name of a format", ".pdf", ".png"]),
+    "a picture in no folder": (lambda u: mjs.plot(u.data, ["rewards"], out=u.tmp / "no/p.png"), ["cannot write", "no directory"]),
+    "a recording without its folder": (lambda u: mjs.RecordEpisodes(u.env), ["RecordEpisodes() missing", "'out' and 'episodes'"]),
+    "one sensor of a scene": (lambda u: mjs.SceneCfg(sensors=mjs.CameraSensorCfg(name="c")), ["must be a sequence of sensors, such as (sensor,), not CameraSensorCfg(name='c'", "..."]),
 }  # fmt: skip
 
 

@@ -36,6 +36,7 @@ def test_entry_point_runs_the_program():
     (("replay", "data", "--episodes", "9-3"), "mjsense: --episodes: '9-3': expected numbers such as 3, or 0-9,12; see mjsense replay --help"),
     (("view", "x", "--seconds", "x"), "mjsense: --seconds is 'x': must be a number; see mjsense view --help"),
     (("record", "pick", "--size"), "mjsense: --size: the value is missing, WxH; see mjsense record --help"),
+    (("record", "--config"), "mjsense: --config: the value is missing, FILE; see mjsense record --help"),
     (("replay",), "mjsense: replay: the argument 'path' is missing: A recording; see mjsense replay --help"),
     (("import",), "mjsense: import: the argument 'format' is missing: one of robomimic, lerobot; see mjsense import --help"),
     (("nothing",), "mjsense: no command 'nothing'; see mjsense --help"),
