@@ -223,6 +223,10 @@ CASES = {
     "number of a camera": (lambda u: mjs.Renderer(u.model).update_scene(u.state, 5), ["camera id 5", "[-1, 1)"]),
     "model for data": (lambda u: mjs.Renderer(u.model).update_scene(u.model), ["Renderer.update_scene()", "data must be a mujoco.MjData", "MjModel"]),
     "size of a Renderer": (lambda u: mjs.Renderer(u.model, 0, 8), ["Renderer", "height", "at least 1", "0"]),
+    "option of a Renderer": (
+        lambda u: setattr(mjs.Renderer(u.model), "sample_per_pixel", 8),
+        ["Renderer has no attribute 'sample_per_pixel'", "did you mean 'samples_per_pixel'?"],
+    ),
     "file for a model": (lambda u: mjs.Renderer("robot.xml"), ["Renderer()", "model must be a mujoco.MjModel", "'robot.xml'"]),
     # environments
     "no task": (lambda u: mjs.make(None), ["make()", "task must be", "the name of one", "None"]),

@@ -53,6 +53,7 @@ _REFUSED_IF_CLEAR = ("mjRND_CULL_FACE",)
 _SHOWN = ("mjRND_SHADOW", "mjRND_REFLECTION", "mjRND_SKYBOX", "mjRND_HAZE", "mjRND_FOG")
 
 
+_OPTIONS = ("point_lights", "shading", "environment", "samples_per_pixel")
 _KINDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "rgb": (np.uint8, (3,)),
     "depth": (np.float32, ()),
@@ -221,6 +222,12 @@ class Renderer:
     def scene(self) -> mujoco.MjvScene:
         """The abstract scene of the last ``update_scene``. Geoms that are added to it, or edited, appear in the image."""
         return self._scene
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Programs may add attributes, as to ``mujoco.Renderer``, but a misspelt option is an error."""
+        if name[0] != "_" and not hasattr(type(self), name) and (near := nearest(name, _OPTIONS)):
+            raise AttributeError(f"Renderer has no attribute '{name}'; did you mean '{near[0]}'?")
+        object.__setattr__(self, name, value)
 
     @property
     def point_lights(self) -> bool:
