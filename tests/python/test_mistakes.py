@@ -44,6 +44,11 @@ class Misspelt(mjs.Task):
         return {}
 
 
+def folder_with(folder, name):
+    (folder / name).touch()
+    return str(folder)
+
+
 # What was written -> parts of the message. A case gets (sim, data, tmp_path).
 CASES = {
     # keywords
@@ -297,6 +302,9 @@ CASES = {
     "camera of a rendering": (lambda u: mjs.render(u.data.root, out=u.tmp / "e", cameras=["tpo"]), ["no camera named 'tpo'"]),
     "a folder without a LeRobot data set": (lambda u: mjs.import_lerobot(u.tmp, out=u.tmp / "e"), ["not a LeRobot data set", "meta/info.json"]),
     "robot of its own": (lambda u: mjs.Robot("fanka"), ["no robot named 'fanka'", "did you mean 'franka'?"]),
+    "folder of a robot": (lambda u: mjs.Robot(folder_with(u.tmp, "robot.toml")), ["is a folder", "pass the file", "robot.toml'"]),
+    "folder of a robot by name": (lambda u: mjs.make("pick", robot=folder_with(u.tmp, "robot.toml")), ["is a folder", "robot.toml'"]),
+    "folder of a scene": (lambda u: mjs.make("pick", scene=folder_with(u.tmp, "scene.toml")), ["is a folder", "scene.toml'"]),
     "file of a robot": (lambda u: mjs.Robot("x/robot.toml"), ["x/robot.toml", "no such file"]),
     "port": (lambda u: mjs.view("pick", port=65536), ["port is 65536", "[0, 65535]"]),
     "stream of a plot": (lambda u: mjs.plot("pick", ["tcp_pos"], seconds=0.1), ["no stream 'tcp_pos'", "did you mean 'tcp_pose'?"]),
