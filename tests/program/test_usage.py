@@ -60,7 +60,7 @@ SCENE = """<mujoco><worldbody><body name="ball"><freejoint/><geom size=".1"/><si
     ("repair folder", "'folder' contains no recording"),
     ("repair pipe", "'pipe' is neither a file nor a folder"),
     ("repair broken.xml", "'broken.xml' is not named trajectories_batch_*_of_*.h5"),
-    ("sensors", "argument 'what' is missing"),
+    ("sensors", "argument 'SCENE.xml|TASK' is missing"),
     ("sensors folder", "folder: is not a file; expected an MJCF file or the name of a task"),
     ("sensors pipe", "pipe: is not a file"),
     ("sensors scene.xml --robot franka", "--robot applies to tasks only, and scene.xml is a scene"),
