@@ -10,6 +10,7 @@ import pytest
 from mjsense import commands
 from mjsense.commands import output, parser, start
 from mjsense.commands.fields import Field
+from mjsense.commands.parser import episodes_of
 
 
 def run(*words, **env):
@@ -120,7 +121,7 @@ def test_each_key_sets_its_option_only(text, expected, tmp_path):
 @pytest.mark.parametrize("command, words, text, expected", (
     ("verify", (), "path = 'data'\ndecode = true", {"path": "data", "decode": True}),
     ("render", ("a", "b"), "width = 64\nno_copy = true\nepisodes = [0, 3]\nadd_camera = ['top=pos=0,0,1']",
-     {"width": 64, "copy": False, "episodes": [0, 3], "add_camera": [("top", {"pos": [0.0, 0.0, 1.0]})]}),
+     {"width": 64, "copy": False, "episodes": [[0], [3]], "add_camera": [("top", {"pos": [0.0, 0.0, 1.0]})]}),
     ("export", (), "format = 'zarr'\npath = 'data'\nout = 'x'", {"format": "zarr", "path": "data", "out": "x"}),
     ("scan", (), "scene = 's.xml'\nframe = 'site:a'\nout = 'x.ply'\nchannels = 4\nno_exclude_parent_body = true\nsteps = 3",
      {"scene": "s.xml", "frame": "site:a", "out": "x.ply", "channels": 4, "exclude_parent_body": False, "steps": 3}),
@@ -183,9 +184,9 @@ def test_texts_are_read(field, text, value):
 
 
 @pytest.mark.parametrize("field, text, message", (
-    (STEPS, "4.5", "--x is '4.5': must be an int"), (STEPS, "99999999999", "--x is '99999999999': must be an int"),
-    (STEPS, "0", "--x is 0: must be between 1 and 9"), (STEPS, "1_0", "--x is '1_0': must be an int"), (STEPS, " 4", "--x is ' 4': must be an int"),
-    (SEED, "-1", "--x is '-1': must be an int from 0 on"), (Field("on", "on", "on", "bool", ""), "1", "--x is '1': must be a bool"),
+    (STEPS, "4.5", "--x is '4.5': must be an int of 32 bits"), (STEPS, "99999999999", "--x is '99999999999': must be an int of 32 bits"),
+    (STEPS, "0", "--x is 0: must be between 1 and 9"), (STEPS, "1_0", "--x is '1_0': must be an int of 32 bits"), (STEPS, " 4", "--x is ' 4': must be an int of 32 bits"),
+    (SEED, "-1", "--x is '-1': must be an int of 64 bits from 0 on"), (Field("on", "on", "on", "bool", ""), "1", "--x is '1': must be a bool"),
     (Field("m", "m", "m", "text", "", is_list=True), "a,,b", "--x is 'a,,b': must be a list, each a str, separated by commas, or none"),
     (Field("x", "x", "x", "number", "", low=0, above_low=True), "nan", "--x is nan: must be above 0"),
     (Field("s", "s", "s", "text", "", words=("left", "right")), "rihgt", "--x is 'rihgt': must be one of left, right; did you mean 'right'?"),
@@ -197,6 +198,19 @@ def test_wrong_texts_are_errors(field, text, message):
 
 
 # What is printed.
+
+
+@pytest.mark.parametrize("words, expected", (
+    (["--episodes", "3", "0-2,7"], [3, 0, 1, 2, 7]), (["--episodes=4-4"], [4]), ([], None),
+))  # fmt: skip
+def test_positions_of_episodes(words, expected):
+    for command in (["replay", "in"], ["render", "in", "out"], ["export", "rlds", "in", "out"], ["dataset", "delete", "in", "out"]):
+        assert episodes_of(start.parsed([*command, *words])) == expected
+
+
+def test_positions_of_episodes_in_experiment_files(tmp_path):
+    (tmp_path / "job.toml").write_text("episodes = [3, 17]")
+    assert episodes_of(start.parsed(["replay", "in", "--config", str(tmp_path / "job.toml")])) == [3, 17]
 
 
 def test_sizes():

@@ -156,6 +156,9 @@ def test_an_evaluation_is_resumed_after_an_error_of_its_policy(tmp_path):
     with pytest.raises(RuntimeError, match="the network is gone") as raised:
         evaluate("pick", policy=Interrupted(), out=tmp_path / "b", **options)
     assert "resume the evaluation to play the others" in str(raised.value.__notes__)
+    with pytest.raises(ValueError, match="already contains") as again:
+        evaluate("pick", policy=Counting(), out=tmp_path / "b", **options)
+    assert not hasattr(again.value, "__notes__")
     with pytest.raises(ValueError, match="policy"):  # its code is another one
         evaluate("pick", policy=Counting(2), out=tmp_path / "b", resume=True, **options)
     again = evaluate("pick", policy=Counting(), out=tmp_path / "b", resume=True, **options)

@@ -44,6 +44,11 @@ class Misspelt(mjs.Task):
         return {}
 
 
+def folder_with(folder, name):
+    (folder / name).touch()
+    return str(folder)
+
+
 # What was written -> parts of the message. A case gets (sim, data, tmp_path).
 CASES = {
     # keywords
@@ -223,6 +228,10 @@ CASES = {
     "number of a camera": (lambda u: mjs.Renderer(u.model).update_scene(u.state, 5), ["camera id 5", "[-1, 1)"]),
     "model for data": (lambda u: mjs.Renderer(u.model).update_scene(u.model), ["Renderer.update_scene()", "data must be a mujoco.MjData", "MjModel"]),
     "size of a Renderer": (lambda u: mjs.Renderer(u.model, 0, 8), ["Renderer", "height", "at least 1", "0"]),
+    "option of a Renderer": (
+        lambda u: setattr(mjs.Renderer(u.model), "sample_per_pixel", 8),
+        ["Renderer has no attribute 'sample_per_pixel'", "did you mean 'samples_per_pixel'?"],
+    ),
     "file for a model": (lambda u: mjs.Renderer("robot.xml"), ["Renderer()", "model must be a mujoco.MjModel", "'robot.xml'"]),
     # environments
     "no task": (lambda u: mjs.make(None), ["make()", "task must be", "the name of one", "None"]),
@@ -293,9 +302,16 @@ CASES = {
     "camera of a rendering": (lambda u: mjs.render(u.data.root, out=u.tmp / "e", cameras=["tpo"]), ["no camera named 'tpo'"]),
     "a folder without a LeRobot data set": (lambda u: mjs.import_lerobot(u.tmp, out=u.tmp / "e"), ["not a LeRobot data set", "meta/info.json"]),
     "robot of its own": (lambda u: mjs.Robot("fanka"), ["no robot named 'fanka'", "did you mean 'franka'?"]),
+    "folder of a robot": (lambda u: mjs.Robot(folder_with(u.tmp, "robot.toml")), ["is a folder", "pass the file", "robot.toml'"]),
+    "folder of a robot by name": (lambda u: mjs.make("pick", robot=folder_with(u.tmp, "robot.toml")), ["is a folder", "robot.toml'"]),
+    "folder of a scene": (lambda u: mjs.make("pick", scene=folder_with(u.tmp, "scene.toml")), ["is a folder", "scene.toml'"]),
     "file of a robot": (lambda u: mjs.Robot("x/robot.toml"), ["x/robot.toml", "no such file"]),
     "port": (lambda u: mjs.view("pick", port=65536), ["port is 65536", "[0, 65535]"]),
     "stream of a plot": (lambda u: mjs.plot("pick", ["tcp_pos"], seconds=0.1), ["no stream 'tcp_pos'", "did you mean 'tcp_pose'?"]),
+    "a picture without a format": (lambda u: mjs.plot(u.data, ["rewards"], out=u.tmp / "p"), ["does not end in the name of a format", ".pdf", ".png"]),
+    "a picture in no folder": (lambda u: mjs.plot(u.data, ["rewards"], out=u.tmp / "no/p.png"), ["cannot write", "no directory"]),
+    "a recording without its folder": (lambda u: mjs.RecordEpisodes(u.env), ["RecordEpisodes() missing", "'out' and 'episodes'"]),
+    "one sensor of a scene": (lambda u: mjs.SceneCfg(sensors=mjs.CameraSensorCfg(name="c")), ["must be a sequence of sensors, such as (sensor,), not CameraSensorCfg(name='c'", "..."]),
 }  # fmt: skip
 
 

@@ -28,11 +28,20 @@ def test_entry_point_runs_the_program():
 
 @pytest.mark.parametrize("words, message", [
     (("record", "pick", "--episode", "3"), "mjsense: record: no option named '--episode'; did you mean '--episodes'?"),
-    (("record", "pick", "3"), "mjsense: The following argument was not expected: 3; see mjsense record --help"),
+    (("record", "pick", "3"), "mjsense: record: unexpected argument '3'; see mjsense record --help"),
     (("replay", "data", "--form=states"), "mjsense: replay: no option named '--form'; did you mean '--from'?"),
     (("replay", "data", "--xyz"), "mjsense: replay: no option named '--xyz'; see mjsense replay --help"),
+    (("replay", "data", "--from", "sttes"), "mjsense: --from is 'sttes': must be one of actions, states; did you mean 'states'?"),
+    (("replay", "data", "--worlds", "x"), "mjsense: --worlds is 'x': must be a whole number; see mjsense replay --help"),
+    (("replay", "data", "--episodes", "9-3"), "mjsense: --episodes: '9-3': expected numbers such as 3, or 0-9,12; see mjsense replay --help"),
+    (("view", "x", "--seconds", "x"), "mjsense: --seconds is 'x': must be a number; see mjsense view --help"),
+    (("record", "pick", "--size"), "mjsense: --size: the value is missing, WxH; see mjsense record --help"),
+    (("record", "--config"), "mjsense: --config: the value is missing, FILE; see mjsense record --help"),
+    (("replay",), "mjsense: replay: the argument 'path' is missing: A recording; see mjsense replay --help"),
+    (("import",), "mjsense: import: the argument 'format' is missing: one of robomimic, lerobot; see mjsense import --help"),
+    (("nothing",), "mjsense: no command 'nothing'; see mjsense --help"),
 ])  # fmt: skip
-def test_unknown_options_are_named_with_the_nearest(words, message):
+def test_wrong_usage_is_described(words, message):
     wrong = run(*words)
     assert (wrong.returncode, wrong.stderr) == (2, message + "\n")
 

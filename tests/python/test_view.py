@@ -455,6 +455,8 @@ def test_export(recording, tmp_path):
     assert (tmp_path / "a.viser").stat().st_size > 20_000
     wrong = subprocess.run([*run, "pick", "--export", "a.mp4"], cwd=tmp_path, capture_output=True, text=True)
     assert wrong.returncode == 2 and "ends in neither .viser nor .rrd" in wrong.stderr
+    wrong = subprocess.run([*run, str(recording), "--export", "no/a.viser"], cwd=tmp_path, capture_output=True, text=True)
+    assert (wrong.returncode, wrong.stderr) == (2, "mjsense: cannot write 'no/a.viser': there is no directory 'no'\n")
 
 
 @needs_viser

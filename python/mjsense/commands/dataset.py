@@ -6,6 +6,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from mjsense.commands.parser import add_episodes, episodes_of, positions
+
 EXAMPLES = [
     ("mjsense dataset delete data data_clean --episodes 3 17", "Write the recording in data without two episodes."),
     ("mjsense dataset split data parts --parts train=0.8 test=0.2", "Write two recordings, parts/train and parts/test."),
@@ -26,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         help="IN ... OUT: one recording, for merge several, and the output, which must not exist.",
     )
-    parser.add_argument("--episodes", type=int, nargs="+", metavar="N", help="delete: positions of the episodes to leave out.")
+    add_episodes(parser, "delete: positions of the episodes to leave out, such as 3 17 or 0-9,12.")
     parser.add_argument(
         "--parts", nargs="+", metavar="PART", help="split: NAME=0.8, a share of all episodes, or NAME=0-9,12, their positions."
     )
@@ -37,9 +39,8 @@ def _part(text: str) -> tuple[str, Any]:
     try:
         if "." in given or given == "1":
             return name, float(given)
-        ranges = [part.split("-") for part in given.split(",")]
-        return name, [i for first, *last in ranges for i in range(int(first), int(last[0] if last else first) + 1)]
-    except (ValueError, IndexError):
+        return name, positions(given)
+    except (ValueError, argparse.ArgumentTypeError):
         raise ValueError(f"--parts: '{text}' is not of the form NAME=0.8 or NAME=0-9,12") from None
 
 
@@ -57,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
             f"{arguments.action}: {len(roots)} recordings and the output '{out}' are given; {count} and the output are needed"
         )
     if arguments.action == "delete":
-        made = [delete_episodes(roots[0], out, arguments.episodes)]
+        made = [delete_episodes(roots[0], out, episodes_of(arguments) or [])]
     elif arguments.action == "split":
         parts = [_part(text) for text in arguments.parts]
         if len(dict(parts)) < len(parts):

@@ -7,6 +7,7 @@ import argparse
 from typing import Any
 
 from mjsense.commands._ray import add_ray, ray_options
+from mjsense.commands.parser import add_episodes, episodes_of
 from mjsense.exporting.formats import FORMATS, OPTIONS, formats_with, given_options
 
 EXAMPLES = [
@@ -25,9 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--map", metavar="FILE", help="TOML file that chooses features and cameras; by default joint positions and all cameras."
     )
-    parser.add_argument(
-        "--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all."
-    )
+    add_episodes(parser, "Positions of episodes in the recording, such as 3 17 or 0-9,12; by default all.")
     parser.add_argument("--success", action="store_true", help="Export only successful episodes.")
     for name, option in OPTIONS.items():
         switch = argparse.BooleanOptionalAction if option.default is None else "store_true"
@@ -46,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     given = {name: getattr(arguments, name) for name in OPTIONS}
     options: dict[str, Any] = given_options(arguments.format, given, {name: _flag(name) for name in OPTIONS})
-    options |= {"map": arguments.map, "episodes": arguments.episodes, "success": arguments.success or None}
+    options |= {"map": arguments.map, "episodes": episodes_of(arguments), "success": arguments.success or None}
     report = counter("episodes", False if arguments.quiet else None)
     with contextlib.redirect_stderr(io.StringIO()) if arguments.quiet else contextlib.nullcontext():
         if arguments.ray:

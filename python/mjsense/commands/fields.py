@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 _EXPECTED = {
     "bool": "a bool",
-    "int": "an int",
-    "unsigned": "an int from 0 on",
+    "int": "an int of 32 bits",
+    "unsigned": "an int of 64 bits from 0 on",
     "number": "a number",
     "text": "a str",
     "path": "a str",

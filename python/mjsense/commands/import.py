@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 
-from mjsense.commands.parser import Parser, field_values
+from mjsense.commands.parser import Parser, add_episodes, episodes_of, field_values
 
 EXAMPLES = [
     ("mjsense import robomimic demo.hdf5 data", "Write a data set of robomimic or robosuite as a recording."),
@@ -31,9 +31,7 @@ def add_arguments(parser: Parser) -> None:
         "path", metavar="IN", help="robomimic: HDF5 file with demonstrations; lerobot: folder of a v3.0 data set."
     )
     parser.add_argument("out", metavar="OUT", help="Output folder.")
-    parser.add_argument(
-        "--episodes", type=int, nargs="+", metavar="N", help="Positions of demonstrations or episodes; by default all."
-    )
+    add_episodes(parser, "Positions of demonstrations or episodes, such as 3 17 or 0-9,12; by default all.")
     parser.add_argument(
         "--fps", type=float, metavar="HZ", help="robomimic: steps per second; by default that of the file, or 20."
     )
@@ -69,9 +67,8 @@ def run(arguments: argparse.Namespace) -> int:
     ]
     if others:
         raise ValueError(f"--{others[0].replace('_', '-')} is not an option of the format {arguments.format}")
-    given = field_values(arguments, "FilesCfg") | {
-        name: getattr(arguments, name) for name in ("episodes", *options[arguments.format])
-    }
+    given = field_values(arguments, "FilesCfg") | {name: getattr(arguments, name) for name in options[arguments.format]}
+    given["episodes"] = episodes_of(arguments)
     if arguments.format == "robomimic":
         from mjsense.dataset.import_robomimic import import_robomimic
 

@@ -18,6 +18,8 @@ _MAX_WIDTH = 100  # longer lines are hard to read
 _NAMED = {"robot": "robots", "policy": "policies", "scene": "scenes"}
 """Options that accept names."""
 _MAX_STEPS = 1_000_000_000
+_NUMBERS = {"int": "a whole number", "float": "a number"}
+_POSITIONS = re.compile(r"(\d{1,7})(?:-(\d{1,7}))?", re.ASCII)
 _LISTED = ("robot", "policy")  # in the help
 
 
@@ -108,22 +110,31 @@ class Parser(argparse.ArgumentParser):
             near = suggestion(name, self._option_string_actions) or f"; see {self.prog} --help"
             raise ValueError(f"{self.name}: no option named '{name}'{near}")
         if rest:
-            raise ValueError(f"The following argument was not expected: {rest[0]}; see {self.prog} --help")
+            raise ValueError(f"{self.name}: unexpected argument '{rest[0]}'; see {self.prog} --help")
         return arguments, rest
 
     def error(self, message: str) -> NoReturn:
         missing = re.fullmatch(r"the following arguments are required: ([^,]*)(, .*)?", message)
         if missing:
-            names = {action.metavar: action.dest for action in self._actions if not action.option_strings}
-            message = f"{names.get(missing[1], missing[1])} is required"
-        raise ValueError(f"{message.removeprefix('argument ')}; see {self.prog} --help")
+            self._missing(next(a for a in self._actions if missing[1] in (a.metavar, a.dest, "/".join(a.option_strings))))
+        wrong = re.fullmatch(r"argument (\S+): invalid (int|float) value: (.*)", message, re.DOTALL)
+        if wrong:
+            message = f"{wrong[1]} is {wrong[3]}: must be {_NUMBERS[wrong[2]]}"
+        raise ValueError(f"{message.removeprefix('argument ')}{'' if message.endswith('?') else f'; see {self.prog} --help'}")
+
+    def _missing(self, action: argparse.Action) -> NoReturn:
+        name = f"option {action.option_strings[-1]}" if action.option_strings else f"argument '{place_of(action)}'"
+        words = ", ".join(map(str, action.choices or ()))
+        about = f"one of {words}" if words else (action.help or "").replace("%%", "%").split(". ")[0].rstrip(".")
+        self.error(f"{self.name}: the {name} is missing: {about}")
 
     def _match_argument(self, action: argparse.Action, arg_strings_pattern: str) -> int:
         try:
             return super()._match_argument(action, arg_strings_pattern)  # pyright: ignore[reportAttributeAccessIssue]
         except argparse.ArgumentError:
-            name = action.option_strings[-1] if action.option_strings else action.dest
-            self.error(f"{name}: 1 required {type_of(action)} missing" if action.option_strings else f"{name} is required")
+            if not action.option_strings:
+                self._missing(action)
+            self.error(f"{action.option_strings[-1]}: the value is missing, {type_of(action)}")
 
     def _get_value(self, action: argparse.Action, arg_string: str) -> Any:
         field = getattr(action, "field", None)
@@ -142,7 +153,7 @@ class Parser(argparse.ArgumentParser):
     def format_help(self) -> str:
         options = [action for action in self._actions if action.option_strings]
         places = [action for action in self._actions if not action.option_strings]
-        words = "".join(f" {f'[{place.dest}]' if place.nargs in ('?', '*') else place.dest}" for place in places)
+        words = "".join(f" [{place_of(one)}]" if one.nargs in ("?", "*") else f" {place_of(one)}" for one in places)
         parts = ["\n".join(wrapped(self.description or "", text_width())), f"Usage: {self.prog} [OPTIONS]{words}"]
         for title, actions in (("Arguments", places), ("Options", options)):
             if actions:
@@ -187,6 +198,31 @@ def add_steps(parser: Parser, text: str, default: int) -> None:
     setattr(action, "shown_default", str(default))  # noqa: B010
 
 
+def positions(text: str) -> list[int]:
+    """The numbers of a text such as ``0-9,12``."""
+    numbers: list[int] = []
+    for part in text.split(","):
+        found = _POSITIONS.fullmatch(part)
+        first, last = (int(found[1]), int(found[2] or found[1])) if found else (1, 0)
+        if last < first:
+            raise argparse.ArgumentTypeError(f"'{text}': expected numbers such as 3, or 0-9,12")
+        numbers += range(first, last + 1)
+    return numbers
+
+
+setattr(positions, "kind", int)  # noqa: B010  # in an experiment file
+
+
+def add_episodes(parser: argparse.ArgumentParser, text: str) -> None:
+    """Adds ``--episodes``, which ``episodes_of`` reads."""
+    parser.add_argument("--episodes", type=positions, nargs="+", metavar="N", help=text)
+
+
+def episodes_of(arguments: argparse.Namespace) -> list[int] | None:
+    """The positions of ``--episodes``, or None if it is not given."""
+    return None if arguments.episodes is None else [one for part in arguments.episodes for one in part]
+
+
 def field_values(arguments: argparse.Namespace, struct: str) -> dict[str, Any]:
     """The fields of a configuration that are given, by their names in Python."""
     fields = FIELDS[struct]
@@ -210,6 +246,11 @@ def complete(action: argparse.Action, words: Sequence[str]) -> argparse.Action:
     return action
 
 
+def place_of(action: argparse.Action) -> str:
+    """Name of an argument that is not an option: ``TASK``."""
+    return action.metavar if isinstance(action.metavar, str) else action.dest
+
+
 def type_of(action: argparse.Action) -> str:
     """``INT``, ``auto|shapes|real``; empty for an option without a value."""
     if action.nargs == 0 or isinstance(action, argparse.BooleanOptionalAction):
@@ -223,7 +264,7 @@ def type_of(action: argparse.Action) -> str:
 def _help_of(action: argparse.Action) -> str:
     kind = type_of(action)
     kind += " ..." if action.nargs in ("+", "*") else ""
-    name = ",".join(action.option_strings) or action.dest
+    name = ",".join(action.option_strings) or place_of(action)
     text = (action.help or "").replace("%%", "%")
     text += " Required." if action.required and action.nargs not in ("?", "*") else ""
     field = getattr(action, "field", None)

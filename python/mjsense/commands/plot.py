@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import argparse
 
+from mjsense.commands.parser import positions
+
 EXAMPLES = [
     ("mjsense plot data --stream tcp_pose qpos/arm", "Draw two streams of the first episode."),
     (
@@ -22,11 +24,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--episode",
-        type=int,
+        type=positions,
         nargs="+",
-        default=[0],
+        default=[[0]],
         metavar="I",
-        help="Positions of episodes in the recording; by default the first.",
+        help="Positions of episodes in the recording, such as 3 17 or 0-9,12; by default the first.",
     )
     parser.add_argument("--world", type=int, default=0, metavar="K", help="World to draw, of live worlds.")
     parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="How long live worlds are stepped, s.")
@@ -44,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
     plot(
         arguments.what,
         arguments.stream,
-        episodes=arguments.episode,
+        episodes=[one for part in arguments.episode for one in part],
         world=arguments.world,
         seconds=arguments.seconds,
         seed=arguments.seed,

@@ -7,7 +7,7 @@ import argparse
 from typing import Any
 
 from mjsense.commands._ray import add_ray, ray_options
-from mjsense.commands.parser import Parser, field_values
+from mjsense.commands.parser import Parser, add_episodes, episodes_of, field_values
 
 EXAMPLES = [
     (
@@ -77,9 +77,7 @@ def add_arguments(parser: Parser) -> None:
     )
     parser.add_argument("--sensors", metavar="FILE", help="TOML file with [[sensors]] tables, as in a robot.toml.")
     parser.add_argument("--copy", action=flag, default=True, help="Copy the videos of recorded cameras that do not change.")
-    parser.add_argument(
-        "--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all."
-    )
+    add_episodes(parser, "Positions of episodes in the recording, such as 3 17 or 0-9,12; by default all.")
     parser.add_fields("RenderCfg")
     add_ray(parser)
     parser.add_argument("-q", "--quiet", action="store_true", help="Print nothing but errors.")
@@ -94,9 +92,9 @@ def run(arguments: argparse.Namespace) -> int:
         if name in added:
             raise ValueError(f"--add-camera: '{name}' is given twice")
         added[name] = camera
-    names = ("cameras", "camera_system", "copy", "episodes")
+    names = ("cameras", "camera_system", "copy")
     options: dict[str, Any] = {name: getattr(arguments, name) for name in names}
-    options |= field_values(arguments, "RenderCfg") | {"add_cameras": added}
+    options |= field_values(arguments, "RenderCfg") | {"add_cameras": added, "episodes": episodes_of(arguments)}
     if arguments.ray:
         return _on_ray(arguments, options)
     made = render(

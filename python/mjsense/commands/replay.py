@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import argparse
 
+from mjsense.commands.parser import add_episodes, episodes_of
+
 EXAMPLES = [
     ("mjsense replay data", "Simulate all episodes with the recorded controls, and compare every state."),
     ("mjsense replay data --from states", "Compute all sensors from the recorded states, and compare every stream."),
@@ -23,9 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "states: compute the sensors from the recorded states and compare them.",
     )
     parser.add_argument("--verify", action="store_true", help="Do both.")
-    parser.add_argument(
-        "--episodes", type=int, nargs="+", metavar="N", help="Positions of episodes in the recording; by default all."
-    )
+    add_episodes(parser, "Positions of episodes in the recording, such as 3 17 or 0-9,12; by default all.")
     parser.add_argument(
         "--worlds", type=int, default=4, metavar="N", help="Number of episodes whose sensors are computed in parallel."
     )
@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.path,
         actions=arguments.verify or arguments.from_ == "actions",
         states=arguments.verify or arguments.from_ == "states",
-        episodes=arguments.episodes,
+        episodes=episodes_of(arguments),
         num_worlds=arguments.worlds,
         threads=arguments.threads,
         progress=False if arguments.quiet else None,

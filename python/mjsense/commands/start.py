@@ -236,7 +236,7 @@ def _run_external(word: str, words: Sequence[str]) -> None:
             signal.signal(number, signal.SIG_IGN)
         if error.errno not in (errno.ENOENT, errno.EACCES, errno.ENOTDIR):
             raise RuntimeError(f"{program}: {error.strerror}") from None
-    raise ValueError(f"no command '{word}'{_nearest_command(word)}")
+    raise ValueError(f"no command '{word}'{_nearest_command(word) or '; see mjsense --help'}")
 
 
 def _nearest_command(word: str) -> str:

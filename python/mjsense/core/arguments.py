@@ -127,12 +127,13 @@ def _check_of(context: str, name: str, annotation: Any) -> Callable[[Any], None]
                     raise ValueError(f"{context}: {name} is {value!r}: must be one of {listed}{did_you_mean(value, choices)}")
                 return
         out_of_range = "an int" in words and isinstance(value, Integral) and not isinstance(value, bool)
-        raise (ValueError if out_of_range else TypeError)(f"{context}: {name} must be {words}, not {_short(value)}")
+        raise (ValueError if out_of_range else TypeError)(f"{context}: {name} must be {words}, not {short(value)}")
 
     return check
 
 
-def _short(value: Any) -> str:
+def short(value: Any) -> str:
+    """The value in a message."""
     text = repr(value)
     return text if len(text) <= 120 else f"{text[:117]}..."
 
@@ -172,6 +173,8 @@ def checked(target: T, owner: str = "", context: str = "") -> T:
                 check(value)
         return function(*args, **kwargs)
 
+    if function.__name__ == "__init__":
+        function.__qualname__ = context.removesuffix("()")  # in Python's message about missing arguments
     return cast(T, call)
 
 

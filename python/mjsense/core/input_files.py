@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,12 @@ def missing(path: Path) -> FileNotFoundError:
     except OSError:  # the directory cannot be listed
         names = []
     return FileNotFoundError(f"{path}: no such file or directory{did_you_mean(path.name, names)}")
+
+
+def expect_no_folder(name: str, file: str, known: Callable[[], Iterable[str]]) -> None:
+    """Raises an error for ``lab_arm`` in place of ``lab_arm/robot.toml``, unless it is a known name."""
+    if Path(name, file).is_file() and name not in known():
+        raise IsADirectoryError(f"'{name}' is a folder; pass the file '{Path(name, file)}'")
 
 
 def unreadable(path: Path, error: OSError, kind: str = "") -> OSError:

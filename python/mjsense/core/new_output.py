@@ -22,6 +22,12 @@ def new_output(out: str | Path) -> Iterator[Path]:
         yield path
 
 
+def expect_folder(path: Path) -> None:
+    """Raises an error if the folder of a file that is written after much work does not exist."""
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"cannot write '{path}': there is no directory '{path.parent}'")
+
+
 @contextlib.contextmanager
 def part_of(final: Path) -> Iterator[Path]:
     """The folder ``OUT.part``, for the process that writes ``final``."""

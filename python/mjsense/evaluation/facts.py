@@ -70,7 +70,8 @@ def warnings_of(dataset: Dataset, rows: list[Row]) -> list[str]:
     found = []
     if any(settings.get("keep_failures") is False for settings in settings_of(dataset)):
         found.append(
-            "Failed episodes were not kept (keep_failures is false): the success rate is that of the kept episodes only."
+            "Failed episodes were not kept, so the success rate is that of the kept episodes only; --keep-failures "
+            "(keep_failures=True) records all."
         )
     if len({key_of(row) for row in rows}) < len(rows):
         found.append("Some episodes are in the recording more than once.")

@@ -245,13 +245,14 @@ def play(
         "episodes": jobs[0][1] if len(jobs) == 1 and isinstance(jobs[0][1], int) else numbers,
     }
     begun = time.perf_counter()
+    is_new = not any(out.glob("house_*/*"))
     not_played: dict[str, int] = {}
     try:
         for job, _ in jobs:
             job |= {"policy": made, "action_noise": noise, "keep_failures": True}
             not_played |= _record(job, sensors, ray, progress)
     except Exception as error:
-        if any(out.glob("house_*/*")):
+        if (is_new or options.get("resume")) and any(out.glob("house_*/*")):
             error.add_note(f"The finished episodes are in '{out}'; resume the evaluation to play the others.")
         raise
     _write(out, {**about, "wall_s": round(time.perf_counter() - begun, 3)})

@@ -100,7 +100,8 @@ def _member(module: Any, name: str, text: str) -> Any:
     found = getattr(module, name, None)
     if found is None:
         known = [one for one, value in vars(module).items() if inspect.isclass(value) and value.__module__ == module.__name__]
-        raise ValueError(f"policy '{text}': '{module.__name__}' has no '{name}'{did_you_mean(name, known, 'its classes are')}")
+        hint = did_you_mean(name, known, "its classes are") if known else "; it defines no class"
+        raise ValueError(f"policy '{text}': '{module.__name__}' has no '{name}'{hint}")
     return found
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from mjsense import _core
 from mjsense.core import mujoco_names, spec_views
-from mjsense.core.arguments import KnownAttributes
+from mjsense.core.arguments import KnownAttributes, short
 
 if TYPE_CHECKING:
     from typing import Self
@@ -98,7 +98,7 @@ class SceneCfg(Config):
         if not all(isinstance(entity, EntityCfg) for entity in entities):
             raise TypeError(f"SceneCfg: entities must be a mapping of names to EntityCfg, not {self.entities!r}")
         if not isinstance(self.sensors, Iterable) or isinstance(self.sensors, (str, SensorCfg)):
-            raise TypeError(f"SceneCfg: sensors must be a sequence, not {self.sensors!r}")
+            raise TypeError(f"SceneCfg: sensors must be a sequence of sensors, such as (sensor,), not {short(self.sensors)}")
         if not isinstance(self.base, (str, Path, NoneType)):
             raise TypeError(f"SceneCfg: base must be a path or XML text, not {self.base!r}")
         if not (self.spec_fn is None or callable(self.spec_fn)):

@@ -29,6 +29,7 @@ _SIZES = (
 # fmt: on
 """Sizes of the model that must stay the same, and that data must have."""
 
+_OPTIONS = ("point_lights", "shading", "environment", "samples_per_pixel")
 _KINDS: dict[str, tuple[type, tuple[int, ...]]] = {
     "rgb": (np.uint8, (3,)),
     "depth": (np.float32, ()),
@@ -157,6 +158,12 @@ class Renderer:
     def scene(self) -> mujoco.MjvScene:
         """The abstract scene of the last ``update_scene``. Geoms that are added to it, or edited, appear in the image."""
         return self._scene
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Programs may add attributes, as to ``mujoco.Renderer``, but a misspelt option is an error."""
+        if name[0] != "_" and not hasattr(type(self), name) and (near := nearest(name, _OPTIONS)):
+            raise AttributeError(f"Renderer has no attribute '{name}'; did you mean '{near[0]}'?")
+        object.__setattr__(self, name, value)
 
     @property
     def point_lights(self) -> bool:

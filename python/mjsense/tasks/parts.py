@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from mjsense import _core
+from mjsense.core.input_files import expect_no_folder
 from mjsense.scene.scene import prepared
 from mjsense.sensors.configs import SceneCfg, SceneFileCfg
 from mjsense.tasks.code_checksums import checksums
@@ -98,9 +101,14 @@ def _composed(options: dict[str, Any]) -> Any:
     return task
 
 
+def _scene_names() -> list[str]:
+    return [scene["name"] for scene in json.loads(_core.scenes_json())]  # pyright: ignore[reportAttributeAccessIssue]  # no stub
+
+
 def scene_of(scene: Scenes) -> tuple[str, SceneFileCfg | None]:
     """Returns (name for messages and files, the object if the scene is configured in Python)."""
     if isinstance(scene, (str, Path)):
+        expect_no_folder(str(scene), "scene.toml", _scene_names)
         return str(scene), None
     if not isinstance(scene, SceneFileCfg):
         scene = SceneFileCfg(name=getattr(scene, "__name__", type(scene).__name__).strip("<>"), models=scene)

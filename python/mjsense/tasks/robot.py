@@ -15,6 +15,7 @@ import numpy as np
 from mjsense import _core
 from mjsense.core.arguments import KnownAttributes, checked
 from mjsense.core.errors import UnknownNameError
+from mjsense.core.input_files import expect_no_folder
 from mjsense.sensors.configs import EntityCfg
 from mjsense.sensors.named_class import sensor_of_class
 
@@ -75,6 +76,7 @@ class Robot(KnownAttributes):
             sensors: Sensors written in Python or of the core suite, in addition to those of the file.
         """
         self._given = os.fspath(name_or_path)
+        expect_no_folder(self._given, "robot.toml", _core.robot_names)
         self._core: Any = _core.Robot(self._given)
         self.sensors: list[Any] = list(sensors)
         """Sensors of this robot in addition to those of its file."""
@@ -180,6 +182,7 @@ def robot_of(robot: Any, context: str = "robot") -> tuple[str, list[Any]]:
     if not isinstance(robot, (str, Path)):
         raise TypeError(f"{context} is {robot!r}: must be the name of a robot, the path of its .toml, a mjsense.Robot, or None")
     name = str(robot)
+    expect_no_folder(name, "robot.toml", _core.robot_names)
     return name, _sensors_of_file(name) if name.endswith(".toml") else []
 
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mjsense.core.new_output import expect_folder
 from mjsense.core.progress_line import tracked
 from mjsense.core.rotations import rotation_of
 from mjsense.dataset import Dataset, Episode
@@ -56,6 +57,7 @@ def export(
     writers = {".viser": _write_viser, ".rrd": _write_rerun}
     if path.suffix not in writers:
         raise ValueError(f"--export: {path.name} ends in neither .viser nor .rrd")
+    expect_folder(path)
     if isinstance(source, Dataset):
         if not 0 <= episode < len(source.episodes):
             raise ValueError(f"episode {episode}: must be in [0, {len(source.episodes)})")

@@ -79,7 +79,7 @@ class Gate:
                 "or start it with --host NAME."
             )
         if not secrets.compare_digest(token.encode(errors="replace"), self._token.encode()):
-            return "The address has no valid token. Open the whole address that the program has printed when it was started."
+            return "The address has no valid token. Open the whole address that the program printed at its start."
         own = [f"http://{host[0]}".lower(), f"https://{host[0]}".lower()]
         if any(one.lower() not in own for one in origin) or (not origin and "Upgrade" in headers):
             return "The request comes from the page of another server."

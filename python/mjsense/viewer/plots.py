@@ -13,6 +13,7 @@ import numpy as np
 
 from mjsense.core.arguments import Seed, checked
 from mjsense.core.errors import UnknownNameError, did_you_mean
+from mjsense.core.new_output import expect_folder
 from mjsense.core.optional import optional
 from mjsense.core.representations import coloured
 from mjsense.dataset import Dataset, Episode
@@ -77,12 +78,20 @@ def plot(
     if not streams:
         raise ValueError("plot() needs the name of a stream")
     figures = optional("matplotlib.figure", "plot", "plot()")
+    if out is not None:
+        _check_picture(Path(out), figures.Figure().canvas.get_supported_filetypes())
     source = source_of(thing, seed=seed, **options)
     tracks = _recorded(source, streams, episodes) if isinstance(source, Dataset) else _live(source, streams, world, seconds)
     figure = _drawn(figures.Figure, tracks)
     if out is not None:
         figure.savefig(out, dpi=110)
     return figure
+
+
+def _check_picture(path: Path, kinds: Iterable[str]) -> None:
+    if path.suffix.lower().removeprefix(".") not in kinds:
+        raise ValueError(f"'{path}' does not end in the name of a format: expected one of .{', .'.join(kinds)}")
+    expect_folder(path)
 
 
 def _expand(names: Iterable[str], known: Iterable[str]) -> list[str]:

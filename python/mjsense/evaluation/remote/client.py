@@ -172,7 +172,11 @@ class Connections:
             except (OSError, EOFError, self._errors.WebSocketException) as error:
                 last = error
             if delay == _FIRST_DELAY:
-                print(f"Waiting for the policy server at {self.url}: {plain(last) or type(last).__name__}", file=sys.stderr)
+                print(
+                    f"Waiting for the policy server at {self.url}, for at most {self._patience:g} s: "
+                    f"{plain(last) or type(last).__name__}",
+                    file=sys.stderr,
+                )
             if self._loop.time() + delay > end:
                 raise ConnectionError(
                     f"no policy server answers at {self.url}, which was tried for {self._patience:g} s: "
