@@ -39,7 +39,7 @@ def test_a_single_environment_is_the_first_of_many():
         others, rewards, *_ = many.step(many.action_space.high)
         assert type(reward) is float and reward == rewards[0] and type(terminated) is bool and info["success"] is False
     assert truncated
-    task.reset()
+    assert task.reset(options={"episodes": [2]})[1]["episode_info"]["number"] == 2
     task.close()
     many.close()
     with pytest.raises(TypeError, match="num_envs"):

@@ -258,6 +258,7 @@ CASES = {
     "an action is nan": (lambda u: u.env.worlds.reset() and u.env.step(np.full(1, np.nan)), ["actions of worlds [0]", "not finite"]),
     "text for an action": (lambda u: u.env.step("left"), ["action", "numbers", "'left'"]),
     "text for a seed": (lambda u: u.env.reset(seed="0"), ["TaskEnv.reset()", "seed", "an int", "'0'"]),
+    "option of a reset": (lambda u: u.env.reset(options={"mask": [True]}), ["options has 'mask'", "'reset_mask' or 'episodes'"]),
     "mask of a reset": (
         lambda u: u.env.worlds.reset() and u.env.worlds.reset(options={"reset_mask": [True, False]}),
         ["reset_mask", "shape (2,)", "(1,)"],

@@ -39,9 +39,9 @@ class TaskEnv(gymnasium.Env):
         return self.worlds._reduced(TaskEnv, self.spec)
 
     def reset(self, *, seed: Seed | None = None, options: dict[str, Any] | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Starts the next episode; with a seed, the first episode of that seed."""
+        """Starts the next episode; with a seed, the first episode of that seed; with ``options["episodes"] = [n]``, episode n."""
         super().reset(seed=seed)
-        observation, infos = self.worlds.reset(seed=seed)
+        observation, infos = self.worlds.reset(seed=seed, options=options)
         self._ended = ""
         return _row(observation, 0), {"episode_info": _about(infos)}
 
