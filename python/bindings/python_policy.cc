@@ -174,6 +174,9 @@ void PythonPolicy::act_all(tasks::episode::ActiveWorlds& worlds,
 void PythonPolicy::call_act() {
   nb::object found = act_.get()(observation_.get());
   const auto B = static_cast<std::size_t>(task_->num_worlds());
+  if (found.is_none())
+    throw ValueError(
+        fmt::format("{} returned None, expected actions of shape ({}, {})", place("act"), B, n_));
   const std::size_t before = chunk_.steps;
   std::vector<double> kept;
   if (before > 1) kept = chunk_.values;

@@ -220,6 +220,7 @@ def test_sensors_of_a_policy(tmp_path):
 @pytest.mark.parametrize(
     "value, error, text",
     [
+        (None, ValueError, r"policy 'wrong': act\(\) returned None, expected actions of shape \(3, 8\)"),
         (np.zeros((3, 7)), ValueError, r"policy 'wrong': act\(\) returned shape \(3, 7\), expected \(3, 8\), or \(3, H, 8\) for H steps, with the columns arm 7, gripper 1"),
         (np.zeros(8), ValueError, r"returned shape \(8,\)"),
         ({"arm": np.zeros((3, 8))}, ValueError, r"returned 'arm' of shape \(3, 8\), expected \(3, 7\)"),

@@ -82,6 +82,8 @@ TEST(Scene, ErrorsNameTheEntity) {
             "entity 'a': no file '/nowhere/a.xml'");
   EXPECT_THAT(fault("a", {.model = {.path = "embedded:robots/franka/fr4.xml"}}),
               HasSubstr("franka/fr"));
+  EXPECT_THAT(fault("a", {.model = {.path = "embedded:robots/q.xml"}}),
+              HasSubstr("no embedded file named 'robots/q.xml'; available: robots/"));
   EXPECT_EQ(fault("a", {}), "entity 'a': no model; give a path or an XML text");
   EXPECT_THAT(fault("a", {.model = {.path = "x.xml", .xml = kBall}}), HasSubstr("not both"));
   EXPECT_THAT(fault("a", xml("<mujoco><worldbody><geom sise='1'/></worldbody></mujoco>")),

@@ -84,6 +84,11 @@ void validate(const MoveGroupCfg& cfg, std::string_view context) {
     throw ValueError(fmt::format("{}: the gripper '{}' needs leaf_site, the site of its tool frame",
                                  context, cfg.name));
   }
+  if (!cfg.actuators.empty() && cfg.open_command == cfg.closed_command) {
+    throw ValueError(
+        fmt::format("{}: the gripper '{}' has the same open_command and closed_command, {:g}",
+                    context, cfg.name, cfg.open_command));
+  }
   // Grasps are planned with these sizes: with 0 there is no grasp of any object.
   struct Size {
     const char *name, *meaning, *example;

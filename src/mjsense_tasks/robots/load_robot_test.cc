@@ -179,8 +179,11 @@ pad_sites = ["flange", "tool/tip"]
                 "the tool's x axis, in m; it is 0: write for example pad_half_width = 0.01"));
   EXPECT_THAT(fault(sites + "max_opening = 0.08\npad_half_width = 0.01\n"),
               HasSubstr("'gripper' needs pad_half_length"));
-  EXPECT_EQ(fault(sites + "max_opening = 0.08\npad_half_width = 0.01\npad_half_length = 0.02\n"),
-            "no error");
+  const std::string sizes = "max_opening = 0.08\npad_half_width = 0.01\npad_half_length = 0.02\n";
+  EXPECT_EQ(fault(sites + sizes), "no error");
+  EXPECT_THAT(
+      fault(sites + sizes + "actuators = [\"lift\"]\nopen_command = 1\nclosed_command = 1\n"),
+      HasSubstr("'gripper' has the same open_command and closed_command, 1"));
   EXPECT_THAT(fault(with("arm.xml", "amr.xml")), HasSubstr("amr.xml"));
 }
 
@@ -192,6 +195,15 @@ TEST_F(RobotFile, ANameThatAPartRepeatsIsNamedWithItsPart) {
       path() + ": part '" + (folder.path / "lifter" / "tool.xml").string() +
           "': its body 'tool/tool' has the name of a body of the models before it; its prefix "
           "is 'tool/': write another one, for example prefix = \"tool2/\"");
+}
+
+TEST_F(RobotFile, StartPositionsAreWithinTheRangesOfTheirJoints) {
+  const RobotCfg cfg = load(with("init = [0.5]", "init = [2.5]"));
+  const mjsense::scene::SpecPtr spec = scene::parse_model({.xml = robot_xml(cfg)}, "test");
+  const ModelPtr model(mj_compile(spec.get(), nullptr));
+  EXPECT_THAT([&] { Robot(cfg, model.get(), 1, ""); },
+              ::testing::ThrowsMessage<ValueError>(HasSubstr(
+                  "start position (init) of joint 'lift' is 2.5, outside of its range [-2, 2]")));
 }
 
 // A hand whose pads are apart along y and whose tool frame is rotated by the site.

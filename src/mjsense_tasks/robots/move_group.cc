@@ -26,6 +26,23 @@ void check_size(const std::string& context, const char* what, std::size_t found)
   }
 }
 
+// The start positions of sliding and hinged joints are within their ranges.
+void check_init(const mjModel* model, const MoveGroup& group, const MoveGroupCfg& cfg,
+                const std::string& context) {
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < group.joints.size(); ++i) {
+    const int joint = group.joints[i];
+    const double value = cfg.init[at], *range = model->jnt_range + 2 * joint;
+    at += qpos_width(model->jnt_type[joint]);
+    if (!model->jnt_limited[joint] || qpos_width(model->jnt_type[joint]) != 1) continue;
+    if (range[0] - 1e-6 <= value && value <= range[1] + 1e-6) continue;
+    throw ValueError(
+        fmt::format("{}: the start position (init) of joint '{}' is {:g}, outside of its "
+                    "range [{:g}, {:g}]",
+                    context, cfg.joints[i], value, range[0], range[1]));
+  }
+}
+
 }  // namespace
 
 MoveGroup resolve_group(const MoveGroupCfg& cfg, const mjModel* model, const std::string& prefix,
@@ -56,6 +73,7 @@ MoveGroup resolve_group(const MoveGroupCfg& cfg, const mjModel* model, const std
     throw ValueError(fmt::format("{}: {} start positions (init) for {} joints with {} positions",
                                  context, cfg.init.size(), cfg.joints.size(), group.qpos.size()));
   }
+  if (!cfg.init.empty()) check_init(model, group, cfg, context);
   if (!cfg.leaf_site.empty()) group.leaf_site = find(mjOBJ_SITE, cfg.leaf_site);
   if (!cfg.root_body.empty()) group.root_body = find(mjOBJ_BODY, cfg.root_body);
   group.open_command = cfg.open_command;
