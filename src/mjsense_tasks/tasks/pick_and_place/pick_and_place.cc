@@ -239,7 +239,7 @@ std::string_view PickAndPlaceTask::missing_beside(const World& world, const Asse
 }
 
 std::string PickAndPlaceTask::start_error(const World& world) const {
-  const std::string fault = scenes::SceneTask::start_error(world);
+  std::string fault = scenes::SceneTask::start_error(world);
   if (!fault.empty() || kind_ != PlaceKind::kNextTo) return fault;
   const auto& objects = episodes_[world.id].objects;
   const double gap =
