@@ -81,7 +81,7 @@ SCENE = """<mujoco><worldbody><body name="ball"><freejoint/><geom size=".1"/><si
     ("scan scene.xml --frame site:s --out x.ply --table broken.xml", "'broken.xml': is not a .npy file"),
     ("scan scene.xml --frame site:s --out x.ply --steps 99999999999", "--steps"),
     ("record pick --out file", "cannot create the directory 'file/house_0'"),
-    ("record pick --out x --seed -1", "--seed is '-1': must be an int from 0 on"),
+    ("record pick --out x --seed -1", "--seed is '-1': must be an int of 64 bits from 0 on"),
     ("record pick --out x --episodes 4294967297", "--episodes is '4294967297': must be an int"),
     ("record pick --out x --worlds 4294967297", "--worlds is '4294967297': must be an int"),
     ("record pick --out x --threads 5000", "threads is 5000: must be 0 (all) to 4096"),

@@ -49,7 +49,7 @@ def chromium():
     return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
-def measure(site, width, timeout=120):
+def measure(site, width, timeout=400):
     """{page: {"tables": count, "wide": [first rows], "foreign": [URLs], "page_wide": pixels}} of all pages."""
     pages = sorted(str(p.relative_to(site)) for p in Path(site).rglob("*.html") if "api" not in p.parts and p.name != "404.html")
     answer = queue.Queue()
