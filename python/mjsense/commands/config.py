@@ -22,9 +22,9 @@ def files_of(words: Sequence[str]) -> list[str]:
     """The values of ``--config`` on a command line."""
     before_end = words[: words.index("--")] if "--" in words else words
     return [
-        next_ or "" if word == "--config" else word.partition("=")[2]
-        for word, next_ in zip(before_end, [*before_end[1:], None])
-        if (word == "--config" and next_ is not None) or word.startswith("--config=")
+        before_end[i + 1] if word == "--config" else word.partition("=")[2]
+        for i, word in enumerate(before_end)
+        if (word == "--config" and i + 1 < len(before_end)) or word.startswith("--config=")
     ]
 
 

@@ -161,8 +161,9 @@ class TaskVectorEnv(VectorEnv):
         all worlds begins with the first of them. ``options["episodes"]`` gives the number of the episode of each of these
         worlds."""
         self._check_open()
-        for name in set(options or ()) - {"reset_mask", "episodes"}:
-            raise ValueError(f"reset(): options has '{name}', expected 'reset_mask' or 'episodes'")
+        for name in options or ():
+            if name not in ("reset_mask", "episodes"):
+                raise ValueError(f"reset(): options has '{name}', expected 'reset_mask' or 'episodes'")
         mask = np.ones(self.num_envs, bool)
         if options and "reset_mask" in options:
             mask = np.asarray(options["reset_mask"], bool)
