@@ -174,8 +174,8 @@ inline Float hidden_by(const ViewGeom& g, Vec3f p, Vec3f n, float reach) {
 
 // A sphere around the points of `lanes`.
 inline float sphere_around(const Surfaces& s, std::uint32_t lanes, float* center) {
-  const int middle = __builtin_ctz(lanes);
-  for (int c = 0; c < 3; ++c) center[c] = s.p[c][middle];
+  const int first = __builtin_ctz(lanes);
+  for (int c = 0; c < 3; ++c) center[c] = s.p[c][first];
   Float square = splat(0.0f);
   for (int k = 0; k < kLanes; k += kWidth) {
     const Vec3f away = load3(s.p, k) - splat(center);
@@ -197,10 +197,10 @@ inline void open_sky(const View& view, const Occluders& tile, const Surfaces& s,
       const int i = first + __builtin_ctz(near);
       if (i >= tile.count) return;
       const ViewGeom& g = view.geoms[tile.list[i]];
-      const float reach = hiding_reach(g, view.physical.occlusion_reach);
+      const float reach = tile.boxes.row(OccluderBoxes::kReach)[i];
       for (int k = 0; k < kLanes; k += kWidth) {
         const Vec3f p = load3(s.p, k), n = load3(s.n, k);
-        // It is not wholly below the horizon of the surface.
+        // Lanes in which the geom is not wholly below the horizon of the surface.
         const Mask over = g.type == mjGEOM_PLANE ? mask_of(kAllLanes)
                                                  : splat(-g.radius) < dot(splat(g.center) - p, n);
         const Mask other =

@@ -87,8 +87,8 @@ struct alignas(64) ViewGeom {
 // if its bounding box says little about its shape.
 bool hides_environment(const ViewGeom& geom);
 
-// Distance from the geom up to which it hides the environment, m; at most `reach`. At the ends given here a
-// sphere hides 2 % of it, or less.
+// Distance from the geom up to which it hides the environment, m; at most `reach`. For shapes that count as
+// rounded it is 3.5 times their thickness, where a sphere hides less than 2 % of the environment.
 inline float hiding_reach(const ViewGeom& geom, float reach) {
   const float* half = geom.aabb + 3;
   const bool box = geom.type == mjGEOM_BOX || geom.type == mjGEOM_PLANE;
