@@ -9,6 +9,7 @@
 set(MJSENSE_ISAS portable)
 if(CMAKE_SYSTEM_NAME STREQUAL "Linux" AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
   list(APPEND MJSENSE_ISAS avx2 avx512)
+  list(APPEND MJSENSE_SOURCES ${PROJECT_SOURCE_DIR}/src/mjsense/core/call_in_frame_x86_64.S)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     set(quiet "-Wno-uninitialized;-Wno-maybe-uninitialized")
     if(CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 12)
@@ -26,6 +27,7 @@ if(CMAKE_SYSTEM_NAME STREQUAL "Linux" AND CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64
   endforeach()
 elseif(CMAKE_SYSTEM_NAME STREQUAL "Linux" AND CMAKE_SYSTEM_PROCESSOR STREQUAL "aarch64")
   list(FILTER MJSENSE_SOURCES EXCLUDE REGEX "_avx(2|512)\\.cc$")
+  list(APPEND MJSENSE_SOURCES ${PROJECT_SOURCE_DIR}/src/mjsense/core/call_in_frame_aarch64.S)
   # As on x86-64 without FMA: products are rounded before they are added, and char is signed.
   add_compile_options(-ffp-contract=off -fsigned-char)
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")

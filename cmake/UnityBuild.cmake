@@ -5,6 +5,7 @@
 # clang examines each file alone.
 function(mjsense_unity target)
   set(sources ${ARGN})
+  list(FILTER sources INCLUDE REGEX "\\.cc$")
   list(SORT sources)
   foreach(file IN LISTS sources)
     string(REGEX REPLACE "^.*/(src/mjsense[^/]*|python)/([^/]+)/.*" "\\2" room ${file})

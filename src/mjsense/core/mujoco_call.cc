@@ -12,60 +12,13 @@
 extern "C" mjfLogHandler _mjPRIVATE_setTlsLogHandler(mjfLogHandler handler);
 extern "C" mjfLogHandler _mjPRIVATE_getGlobalLogHandler();
 
-// Runs call(argument) in a stack frame with the personality routine below. An unwinder calls the
-// personality routine of a frame to find out whether the frame handles an exception. Those of C++
-// compilers call back into the unwinder of their own run-time library; this one does not.
+// Runs call(argument) in a stack frame with the personality routine below (call_in_frame_*.S). An
+// unwinder calls the personality routine of a frame to find out whether the frame handles an
+// exception. Those of C++ compilers call back into the unwinder of their own run-time library; this
+// one does not.
 extern "C" void mjsense_call_in_frame(void (*call)(void*), void* argument);
 extern "C" [[gnu::used, gnu::visibility("hidden")]] _Unwind_Reason_Code mjsense_personality(
     int, _Unwind_Action, _Unwind_Exception_Class, _Unwind_Exception*, _Unwind_Context*);
-
-#if defined(__x86_64__)
-asm(R"(
-  .text
-  .globl mjsense_call_in_frame
-  .hidden mjsense_call_in_frame
-  .type mjsense_call_in_frame, @function
-mjsense_call_in_frame:
-  .cfi_startproc
-  .cfi_personality 0x1b, mjsense_personality
-  subq $8, %rsp
-  .cfi_adjust_cfa_offset 8
-  movq %rdi, %rax
-  movq %rsi, %rdi
-  call *%rax
-  addq $8, %rsp
-  .cfi_adjust_cfa_offset -8
-  ret
-  .cfi_endproc
-  .size mjsense_call_in_frame, .-mjsense_call_in_frame
-)");
-#elif defined(__aarch64__)
-asm(R"(
-  .text
-  .globl mjsense_call_in_frame
-  .hidden mjsense_call_in_frame
-  .type mjsense_call_in_frame, %function
-mjsense_call_in_frame:
-  .cfi_startproc
-  .cfi_personality 0x1b, mjsense_personality
-  stp x29, x30, [sp, -16]!
-  .cfi_def_cfa_offset 16
-  .cfi_offset 29, -16
-  .cfi_offset 30, -8
-  mov x2, x0
-  mov x0, x1
-  blr x2
-  ldp x29, x30, [sp], 16
-  .cfi_restore 29
-  .cfi_restore 30
-  .cfi_def_cfa_offset 0
-  ret
-  .cfi_endproc
-  .size mjsense_call_in_frame, .-mjsense_call_in_frame
-)");
-#else
-#error "mjsense_call_in_frame() supports x86-64 and AArch64 only"
-#endif
 
 namespace mjsense {
 namespace {
