@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import pytest
+from program_runs import run_program
 
 from mjsense import commands
 from mjsense.commands import output, parser, start
@@ -14,9 +15,7 @@ from mjsense.commands.parser import episodes_of
 
 
 def run(*words, **env):
-    return subprocess.run(
-        [sys.executable, "-m", "mjsense", *words], capture_output=True, text=True, env={**os.environ, **env}, timeout=120
-    )
+    return run_program(*words, env=env)
 
 
 @pytest.mark.parametrize("name", commands.COMMANDS)
@@ -28,6 +27,7 @@ def test_help_is_wrapped_and_shows_two_examples(name, columns, monkeypatch):
     description, examples = of_name.format_help().split("Examples:\n")
     assert max(map(len, description.splitlines())) <= max(60, min(columns, 100))
     assert sum(f"mjsense {name}" in line for line in examples.splitlines()) >= 2
+    assert not any(line.endswith(" ") for line in [*description.splitlines(), *examples.splitlines()])
     assert all(action.help and action.help.endswith((".", ".)", "]")) for action in of_name._actions if action.dest != "help")
 
 

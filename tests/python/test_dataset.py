@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 import pytest
 from edited_recordings import changed
+from program_runs import run_program
 
 import mjsense as mjs
 from mjsense.dataset import json_rows as rows_as_json
@@ -187,7 +188,7 @@ def test_a_recording_of_the_first_format(tmp_path):
     with tarfile.open(Path(__file__).parent / "recordings/first_format.tar.xz") as archive:
         archive.extractall(tmp_path, filter="data")
     for command, expected in (("verify", "intact: 1 files, 1 episodes, 3 observations, 2 videos"), ("inspect", "1 x horizon reached")):
-        done = subprocess.run([sys.executable, "-m", "mjsense", command, tmp_path], capture_output=True, text=True)
+        done = run_program(command, tmp_path)
         assert done.returncode == 0 and expected in done.stdout, done.stdout + done.stderr
     dataset = mjs.Dataset(tmp_path)
     episode = dataset.episodes[0]

@@ -2,10 +2,8 @@
 """Code blocks of the pages run unchanged (CONTRIBUTING, "Documentation")."""
 
 import importlib.util
-import os
 import re
 import shlex
-import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -14,6 +12,7 @@ from unittest.mock import MagicMock
 
 import mujoco
 import pytest
+from program_runs import run_program
 
 import mjsense as mjs
 from mjsense import commands
@@ -124,8 +123,7 @@ def run(arguments, cwd):
     if is_only_parsed:
         commands.parser_of(arguments[0]).parse_args(arguments[1:])
         return
-    path = os.pathsep.join([str(Path(mjs.__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])])
-    done = subprocess.run([sys.executable, "-m", "mjsense", *arguments], cwd=cwd, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": path})
+    done = run_program(*arguments, cwd=cwd)
     assert done.returncode == 0, f"mjsense {shlex.join(arguments)}\n{done.stdout}{done.stderr}"
 
 
@@ -172,7 +170,7 @@ def test_command_lines(page, tmp_path):
 
 
 def test_the_page_of_the_program_lists_every_command():
-    program = subprocess.run([sys.executable, "-m", "mjsense", "--help"], capture_output=True, text=True, check=True).stdout
+    program = run_program("--help").stdout
     commands = re.findall(r"^  ([a-z]+) ", program.partition("Subcommands:")[2], re.MULTILINE)
     table = (ROOT / "docs/program.md").read_text().partition("| --- |")[2].partition("\n\n")[0]
     assert len(commands) > 20 and [name for name in commands if not re.search(rf"`(mjsense )?{name}\b", table)] == []

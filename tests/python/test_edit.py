@@ -3,12 +3,11 @@
 
 import json
 import shutil
-import subprocess
-import sys
 
 import h5py
 import numpy as np
 import pytest
+from program_runs import run_program
 
 import mjsense as mjs
 from mjsense import commands
@@ -26,7 +25,7 @@ def root(tmp_path_factory):
 
 
 def verified(out):
-    done = subprocess.run([sys.executable, "-m", "mjsense", "verify", str(out), "--decode"], capture_output=True, text=True)
+    done = run_program("verify", str(out), "--decode")
     assert done.returncode == 0 and "note" not in done.stdout, done.stdout + done.stderr
     return int(done.stdout.split(" episodes")[0].split()[-1])
 
@@ -92,7 +91,7 @@ def test_a_damaged_value_stays_visible(root, tmp_path):
     with h5py.File(next((tmp_path / "data").glob("*/*.h5")), "a") as file:
         file["traj_1/obs/extra/tcp_pose"][2, 0] += 1
     mjs.delete_episodes(tmp_path / "data", tmp_path / "out", [0])
-    done = subprocess.run([sys.executable, "-m", "mjsense", "verify", str(tmp_path / "out")], capture_output=True, text=True)
+    done = run_program("verify", str(tmp_path / "out"))
     assert done.returncode == 1 and "tcp_pose differs from what was recorded" in done.stdout
 
 

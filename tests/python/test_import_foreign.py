@@ -3,14 +3,13 @@
 
 import json
 import os
-import subprocess
-import sys
 import zipfile
 from fractions import Fraction
 
 import h5py
 import numpy as np
 import pytest
+from program_runs import run_program
 
 import mjsense as mjs
 from mjsense.core.png import png_of
@@ -368,5 +367,5 @@ def test_values_that_are_not_numbers_are_kept_and_intact(video, tmp_path):
     mjs.import_robomimic(robomimic(tmp_path / "demo.hdf5", change=replaced("obs/joint", np.full((5, 2), np.nan))), tmp_path / "out2")
     for out, name in ((tmp_path / "out", "state"), (tmp_path / "out2", "joint")):
         assert np.isnan(mjs.Dataset(out).episodes[0][f"obs/extra/observation/{name}"][:, 0]).all()
-        done = subprocess.run([sys.executable, "-m", "mjsense", "verify", out], capture_output=True, text=True)
+        done = run_program("verify", out)
         assert done.returncode == 0 and "intact" in done.stdout, done.stdout + done.stderr

@@ -2,8 +2,6 @@
 """Import of LeRobot data sets."""
 
 import json
-import subprocess
-import sys
 import zipfile
 
 import h5py
@@ -12,6 +10,8 @@ import pytest
 
 pytest.importorskip("av")
 pytest.importorskip("pyarrow")
+
+from program_runs import run_program
 
 import mjsense as mjs
 from mjsense import commands
@@ -41,7 +41,7 @@ def test_an_exported_recording_comes_back(made, tmp_path):
         np.testing.assert_array_equal(b["rewards"], a["rewards"][:-1])
         assert np.abs(b.video("wrist")[:].astype(float) - a.video("wrist_camera")[:8]).mean() < 5
         np.testing.assert_allclose(b.video("eye_depth")[:], a.video("exo_camera_1_depth")[:8].clip(0.01, 10), atol=0.004)
-    done = subprocess.run([sys.executable, "-m", "mjsense", "verify", tmp_path / "back"], capture_output=True, text=True, timeout=100)
+    done = run_program("verify", tmp_path / "back")
     assert done.returncode == 0 and "2 episodes" in done.stdout, done.stdout + done.stderr
 
 

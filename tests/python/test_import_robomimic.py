@@ -9,6 +9,7 @@ import h5py
 import mujoco
 import numpy as np
 import pytest
+from program_runs import run_program
 
 import mjsense as mjs
 from mjsense.core.png import png_of as png
@@ -33,7 +34,7 @@ def test_an_exported_recording_comes_back(tmp_path):
             assert np.abs(colour[0] - colour[1]).mean() < 5
             for (_, x), (_, y) in zip(a.replay(), b.replay()):
                 np.testing.assert_allclose(y.xpos, x.xpos, atol=1e-6)
-    done = subprocess.run([sys.executable, "-m", "mjsense", "verify", tmp_path / "back"], capture_output=True, text=True)
+    done = run_program("verify", tmp_path / "back")
     assert done.returncode == 0 and "intact: 2 files, 2 episodes" in done.stdout, done.stdout + done.stderr
 
 

@@ -14,6 +14,8 @@ fsspec = pytest.importorskip("fsspec")
 pa = pytest.importorskip("pyarrow")
 pq = pytest.importorskip("pyarrow.parquet")
 
+from program_runs import run_program
+
 import mjsense as mjs
 from mjsense import commands
 from mjsense.cluster import Job, tools
@@ -129,6 +131,6 @@ def test_options_of_the_program(recording, capfd):
 
 @pytest.mark.parametrize("command, code, text", (("verify", 0, "5 episodes in index.parquet"), ("inspect", 0, "5 episodes, 0 successes"), ("repair", 0, "nothing to repair")))
 def test_program(recording, command, code, text):
-    done = subprocess.run([sys.executable, "-m", "mjsense", command, f"file://{recording}"], capture_output=True, text=True, timeout=60)
+    done = run_program(command, f"file://{recording}")
     assert done.returncode == code and text in done.stdout, done.stdout + done.stderr
     assert commands.run(["replay", f"file://{recording}", "--episodes", "0", "-q"]) == 0

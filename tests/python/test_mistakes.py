@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Typical mistakes of users. Each message is one line that names the thing, what was found, what is expected, and the nearest name."""
 
-import subprocess
-import sys
 from types import SimpleNamespace
 
 import gymnasium
 import mujoco
 import numpy as np
 import pytest
+from program_runs import run_program
 from tasks import Cart, Driver
 
 import mjsense as mjs
@@ -361,7 +360,7 @@ def test_an_environment_that_has_ended_asks_for_a_reset():
 
 @pytest.mark.parametrize("words", [["help"], ["help", "record"], ["help", "export"]])
 def test_help_is_a_command(words):
-    found, expected = (subprocess.run([sys.executable, "-m", "mjsense", *given], capture_output=True, text=True) for given in (words, [*words[1:], "--help"]))
+    found, expected = (run_program(*given) for given in (words, [*words[1:], "--help"]))
     assert found.returncode == expected.returncode == 0
     assert found.stdout == expected.stdout != ""
 

@@ -11,6 +11,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
+from program_runs import run_program
 from tasks import Cart, Driver
 
 import mjsense as mjs
@@ -318,7 +319,7 @@ def test_recorded_options_replay_without_mujoco(moon):
 
 def test_options_that_change_during_an_episode_are_named(tmp_path):
     mjs.record(task := Storm(), policy=Driver(task), out=tmp_path, **RECORDING)
-    done = subprocess.run([sys.executable, "-m", "mjsense", "verify", tmp_path], capture_output=True, text=True)
+    done = run_program("verify", tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     report = mjs.check_replay(tmp_path)
     assert not report

@@ -3,18 +3,16 @@
 
 import json
 import os
-import subprocess
 import sys
 
 import pytest
+from program_runs import run_program
 
 from mjsense.recording import ffmpeg
 
 
 def run(*words, **env):
-    return subprocess.run(
-        [sys.executable, "-m", "mjsense", *words], capture_output=True, text=True, env={**os.environ, **env}, timeout=120
-    )
+    return run_program(*words, env=env)
 
 
 def test_entry_point_runs_the_program():

@@ -2,11 +2,10 @@
 """Figures of episodes: a policy that moves, waits and moves again; picks of the planner; the program."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from program_runs import run_program
 from waiting import MOVES, WAITS, Waiting
 
 import mjsense as mjs
@@ -112,9 +111,7 @@ def test_program(picks, waiting, capsys):
 
 def test_inspect_with_quality(picks):
     def inspect(*options):
-        done = subprocess.run(
-            [sys.executable, "-m", "mjsense", "inspect", str(picks), "--quality", *options], capture_output=True, text=True
-        )
+        done = run_program("inspect", str(picks), "--quality", *options)
         assert done.returncode == 0, done.stderr
         return done.stdout
 

@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 import pytest
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
+from program_runs import run_program
 
 import mjsense as mjs
 from mjsense.exporting.mapping import Source
@@ -76,7 +77,7 @@ def play(env, steps):
 
 
 def verified(folder):
-    done = subprocess.run([sys.executable, "-m", "mjsense", "verify", str(folder)], capture_output=True, text=True, check=False)
+    done = run_program("verify", str(folder))
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -371,7 +372,7 @@ def test_environments_in_other_processes_record_to_folders_of_their_own(tmp_path
 
 SCRIPT = """
 import sys, time, warnings
-sys.path.insert(0, {tests!r})
+sys.path[:0] = {tests!r}
 warnings.simplefilter("ignore")
 import numpy as np, mjsense as mjs
 from test_record_episodes import Counter
@@ -389,7 +390,7 @@ env.close()
 
 
 def test_a_killed_recording_is_resumed(tmp_path):
-    script = SCRIPT.format(tests=str(Path(__file__).parent))
+    script = SCRIPT.format(tests=[str(folder) for folder in Path(__file__).parents[:2]])
     with subprocess.Popen([sys.executable, "-c", script, tmp_path, "slow"], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         while int(process.stdout.readline()) < 3:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import tasks
 from edited_recordings import changed, file_of
+from program_runs import run_program
 
 import mjsense as mjs
 from mjsense.core.declared_fields import declared_fields
@@ -33,7 +34,7 @@ def recorded(tmp_path_factory):
 
 
 def verified(out):
-    done = subprocess.run([sys.executable, "-m", "mjsense", "verify", str(out)], capture_output=True, text=True)
+    done = run_program("verify", str(out))
     assert done.returncode == 0 and "note" not in done.stdout, done.stdout + done.stderr
     return done.stdout
 
@@ -354,7 +355,7 @@ def test_damage_is_noticed(recorded, tmp_path):
         path.write_bytes(data)
 
     def verify(out):
-        done = subprocess.run([sys.executable, "-m", "mjsense", "verify", str(out)], capture_output=True, text=True)
+        done = run_program("verify", str(out))
         return done.returncode, done.stdout
 
     shutil.copytree(recorded, tmp_path / "data")
@@ -389,7 +390,7 @@ def test_a_missing_stream_that_was_carried_over_is_noticed(recorded, tmp_path, l
         verified(tmp_path / name)
         with changed(file_of(tmp_path / name)) as file:
             del file[f"traj_0/{lost}"]
-        done = subprocess.run([sys.executable, "-m", "mjsense", "verify", str(tmp_path / name)], capture_output=True, text=True)
+        done = run_program("verify", str(tmp_path / name))
         assert done.returncode == 1 and f"has no '{lost}'" in done.stdout.replace("obs/extra/wrist_camera", "obs/sensor_data/wrist_camera"), done.stdout
         shutil.rmtree(tmp_path / "first", ignore_errors=True)
 
@@ -441,7 +442,7 @@ def test_errors(recorded, tmp_path):
 
 def test_program(recorded, tmp_path):
     def run(*words):
-        return subprocess.run([sys.executable, "-m", "mjsense", *map(str, words)], capture_output=True, text=True)
+        return run_program(*map(str, words))
 
     done = run(
         "render",

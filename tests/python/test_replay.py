@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 import pytest
 from edited_recordings import changed, file_of
+from program_runs import run_program
 
 import mjsense as mjs
 
@@ -151,7 +152,7 @@ def test_program(pick, door):
     """``mjsense replay``: exit code, report and JSON."""
 
     def run(*words):
-        return subprocess.run([sys.executable, "-m", "mjsense", "replay", *map(str, words)], capture_output=True, text=True)
+        return run_program("replay", *map(str, words))
 
     done = run(pick, "--verify", "--episodes", 1, "--json")
     report = json.loads(done.stdout)

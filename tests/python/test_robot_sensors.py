@@ -10,6 +10,7 @@ import gymnasium
 import h5py
 import numpy as np
 import pytest
+from program_runs import run_program
 
 import mjsense as mjs
 
@@ -124,9 +125,8 @@ def test_sensors_of_an_object():
 
 def test_program_names_a_class_that_is_not_found(robot, tmp_path):
     file = robot(PYTHON)
-    done = subprocess.run(
-        [sys.executable, "-m", "mjsense", "record", "pick", "--robot", str(file), "--cameras", "none", "--out", str(tmp_path / "out")],
-        capture_output=True, text=True)  # fmt: skip
+    words = ["record", "pick", "--robot", file, "--cameras", "none", "--out", tmp_path / "out"]
+    done = run_program(*words, stdin=subprocess.DEVNULL)  # a process of its own, without this one's sys.path
     assert done.returncode != 0
     assert "robot.toml: sensor 'grip': class 'lab_sensors:Grip' is not found: No module named 'lab_sensors'" in done.stderr
 

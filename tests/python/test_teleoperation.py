@@ -14,6 +14,7 @@ import pytest
 pytest.importorskip("viser", reason="viser is not installed")
 
 from devtools import Page, needs_chromium
+from program_runs import run_program
 
 import mjsense as mjs
 from mjsense.core.rotations import rotation_of
@@ -126,7 +127,7 @@ def test_a_block_is_picked_with_keys(tmp_path, port):
             page.close()
         player.kill()
         player.wait()
-    verified = subprocess.run([sys.executable, "-m", "mjsense", "verify", "--json", tmp_path / "out"], capture_output=True, text=True)
+    verified = run_program("verify", "--json", tmp_path / "out")
     assert verified.returncode == 0, verified.stdout
     episode = mjs.Dataset(tmp_path / "out").episodes[0]
     assert episode.success and json.loads(verified.stdout)

@@ -18,6 +18,7 @@ import pytest
 pytest.importorskip("viser", reason="viser is not installed: pip install 'mjsense[view]'")
 
 import devtools
+from program_runs import run_program
 from raw_client import RawClient, eventually, get
 
 import mjsense as mjs
@@ -521,7 +522,7 @@ def test_hostile_commands_are_not_recorded(tmp_path, port):
     commands = np.asarray(episode["actions/commanded_action/arm"], np.float64)
     assert len(commands) > 3 and np.abs(commands[:, :3]).max() <= REACH and commands[:, 2].max() > 1.5
     np.testing.assert_allclose(np.linalg.norm(commands[1:, 3:7], axis=1), 1, atol=1e-6)
-    assert subprocess.run([sys.executable, "-m", "mjsense", "verify", tmp_path / "out"], capture_output=True).returncode == 0
+    assert run_program("verify", tmp_path / "out").returncode == 0
 
 
 def test_the_instruction_is_shown_and_given_to_policies(port):
