@@ -423,6 +423,12 @@ def test_streams_that_the_description_lists(root):
         shutil.rmtree(copy)
 
 
+@pytest.mark.parametrize(("kind", "more"), [("camera", {}), ("body", {"pos": [0, 0, 1], "quat": [1, 0, 0, 0]})])
+def test_a_frame_of_a_camera_that_the_model_lacks(root, tmp_path, kind, more):
+    describe(root, lambda about: about["settings"]["cameras"][0].update({kind: "robot_0/gone", **more}))
+    assert_refused(root, tmp_path, f"camera 'wrist_camera': no {kind} named 'robot_0/gone'", ("render",))
+
+
 def test_a_rendering_names_a_scene_with_numbers_that_json_lacks(root, tmp_path):
     with changed(file_of(root)) as file:
         scene = bytes(file["traj_0/obs_scene"][()]).decode().rstrip("\0")

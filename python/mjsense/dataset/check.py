@@ -12,13 +12,14 @@ from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from mjsense.core import libmujoco
 from mjsense.dataset import playback
 from mjsense.dataset.episode import Episode
 from mjsense.dataset.episode_rows import Store
 from mjsense.dataset.files import batches, entries_of
 from mjsense.dataset.hdf5 import Group, open_h5
 from mjsense.dataset.json_rows import decode
-from mjsense.dataset.render_cameras import recorded_cameras
+from mjsense.dataset.render_cameras import check_frames, recorded_cameras
 from mjsense.dataset.streams import NUMBERS, REPLAY, VIDEOS, is_json
 from mjsense.dataset.video_decoder import Packets, have_av
 
@@ -127,7 +128,9 @@ def _check_replay(episode: Episode) -> None:
             if len(name) != _NAME_BYTES:  # a rendering writes the new name in its place
                 raise ValueError(f"{name.where} has {len(name)} bytes; the name of a video has {_NAME_BYTES}")
     playback.check_episode(episode)
-    recorded_cameras(episode, None)
+    cameras = recorded_cameras(episode, None)
+    if libmujoco.shared is not None:
+        check_frames(cameras, playback.archived_model(episode), episode)
 
 
 _CHECKS: tuple[Callable[[Episode], None], ...] = (_check_text, _check_rows, _check_streams, _check_videos, _check_replay)

@@ -48,6 +48,7 @@ class EpisodeWorlds:
         num_worlds: Number of worlds.
         sensors: Sensors of the scene.
         edit: Edits the spec before it is compiled. Bodies, joints and geoms must stay as they are.
+        check: Is called with the archived model.
         brightness: Factor of all lights.
         threads: Number of threads; 0: one per available CPU.
     """
@@ -59,6 +60,7 @@ class EpisodeWorlds:
         sensors: Sequence[Any] = (),
         *,
         edit: Callable[[Any], None] | None = None,
+        check: Callable[[Any], None] | None = None,
         brightness: float = 1.0,
         threads: int = 0,
     ) -> None:
@@ -79,6 +81,8 @@ class EpisodeWorlds:
         with compiling(str(archive)):
             recorded = Scene(_ArchivedSceneCfg(text, members)).model
         check_compiled(recorded, str(archive))
+        if check is not None:
+            check(recorded)
         self.scene = Scene(_ArchivedSceneCfg(text, members, sensors=tuple(sensors), spec_fn=edit_spec))
         self.sim = Simulation(self.scene, num_worlds, threads=threads)
         self._rows: dict[str, Any] = {}

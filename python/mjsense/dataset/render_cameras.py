@@ -124,6 +124,14 @@ def recorded_cameras(episode: Episode, names: Sequence[str] | None) -> list[Rend
     return cameras
 
 
+def check_frames(cameras: Sequence[RenderCamera], model: Any, episode: Episode) -> None:
+    """Raises UnknownNameError if the archived model does not have the camera or the body of a camera."""
+    for camera in cameras:
+        for kind, name in ((mujoco_names.Obj.CAMERA, camera.camera), (mujoco_names.Obj.BODY, camera.body)):
+            if name:
+                mujoco_names.known_id(model, kind, name, f"{episode.path}: camera '{camera.name}'")
+
+
 _KEYS = ("pos", "lookat", "quat", "body", "up", "fovy", "width", "height", "depth", "segmentation")
 
 
