@@ -2,9 +2,11 @@
 #pragma once
 // Thread pool for casting rays and shading tiles. It is used instead of TBB's parallel_for because
 // a run allocates nothing, hands out items in order and reports the lowest failing item. It is as
-// fast: 64 items on two threads take 0.3 us (TBB: 1.2 us) if they are empty and 89 us (TBB: 89 us)
-// if each takes 1.4 us. Physics runs on MuJoCo's own pool. The two never run at the same time, so
-// together they never use more threads than requested.
+// fast within a few percent. Medians on two threads, in turns, of run(), run_near(), TBB with its
+// static_partitioner and TBB with its auto_partitioner: 64 items of 20 us take 687, 665, 663 and
+// 668 us; 4,096 items of 2 us 4.17, 4.15, 4.13 and 4.15 ms; 64 empty items 0.6, 0.6, 0.4 and
+// 1.3 us. Physics runs on MuJoCo's own pool. The two never run at the same time, so together they
+// never use more threads than requested.
 
 #include <atomic>
 #include <condition_variable>
