@@ -149,7 +149,7 @@ class _House:
             min(options["num_worlds"], len(self._episodes)),
             [*views, *scene_sensors],
             edit=options["edit"],
-            check=lambda model: render_cameras.check_frames(cameras, model, first),
+            check=lambda model: render_cameras.check_frames(render_cameras.recorded_cameras(first, None), model, first),
             brightness=brightness,
             threads=options["threads"],
         )
