@@ -234,7 +234,7 @@ def _make_h5(path: Path, about: dict[str, Any]) -> None:
             options["chunks"] = tuple(min(size, about["chunk"] if i == 0 else 1000) for i, size in enumerate(shape))
         dataset = file.create_dataset("g/x", shape=shape, dtype=kind, **options)
         if about["values"] and kind.kind in "iuf":
-            dataset[...] = 1
+            dataset[...] = np.ones(shape, kind)  # h5py writes a single number element by element
         for i, raw in enumerate(about["raw"] if options else []):
             if i * options["chunks"][0] < shape[0]:
                 dataset.id.write_direct_chunk((i * options["chunks"][0], *[0] * (len(shape) - 1)), raw, about["mask"])
