@@ -24,7 +24,7 @@ if [ "$arch" != "$(uname -m)" ]; then
   "packaging/${arch}_sysroot.sh"
   work+=_$arch
   set -- -C "cmake.define.CMAKE_TOOLCHAIN_FILE=$PWD/cmake/$arch.cmake" "$@"
-  export _PYTHON_HOST_PLATFORM=linux-$arch  # the platform in the name of the wheel; pip would install tools for it
+  export _PYTHON_HOST_PLATFORM=linux-$arch  # the platform of the wheel, and of whatever pip would install from here on
 fi
 packaging/libraries.sh $tools/bin/python "$arch"
 

@@ -18,9 +18,8 @@ PROGRAM = shlex.split(os.environ.get("MJSENSE_PROGRAM", "")) or [sys.executable,
 _FORKS = multiprocessing.get_context("forkserver")
 _FORKS.set_forkserver_preload(["mjsense.commands.start", "program_runs"])
 
-
 _environment = None
-"""The environment variables of the process that is forked."""
+"""The environment variables of the process from which runs are forked."""
 
 
 def _run(words, cwd, stdout, stderr):
@@ -34,14 +33,17 @@ def _run(words, cwd, stdout, stderr):
     sys.exit(main())
 
 
-def run_program(*words, cwd=None, env=None, timeout=300, **kwargs):
-    """Runs the program like subprocess.run(), and returns its outputs as text. It has a process of its own with further arguments of
-    subprocess.run(), if `env` changes environment variables, and if those of this process have changed."""
+def run_program(*words, cwd=None, env=None, timeout=300, alone=False, **kwargs):
+    """Runs the program like subprocess.run(), and returns its outputs as text.
+
+    With `alone` it is started as users start it. So it is, too, if `env` or this process changes environment variables, and with
+    further arguments of subprocess.run(). Otherwise it is forked, and has the sys.path of this process.
+    """
     global _environment
     words = [str(word) for word in words]
     now = {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}
     _environment = _environment or now
-    if env or kwargs or "MJSENSE_PROGRAM" in os.environ or now != _environment:
+    if alone or env or kwargs or "MJSENSE_PROGRAM" in os.environ or now != _environment:
         return subprocess.run(
             [*PROGRAM, *words], cwd=cwd, env={**os.environ, **(env or {})}, capture_output=True, text=True, timeout=timeout, **kwargs)
     with tempfile.TemporaryDirectory() as folder:

@@ -16,12 +16,21 @@ def run(*words, **env):
 
 
 def test_entry_point_runs_the_program():
-    version = run("--version")
+    version = run_program("--version", alone=True)
     assert (version.returncode, version.stderr) == (0, "")
     assert version.stdout.startswith("mjsense ")
-    assert "record" in run("--help").stdout
-    wrong = run("sensrs")
+    assert "record" in run_program("--help", alone=True).stdout
+    wrong = run_program("sensrs", alone=True)
     assert (wrong.returncode, wrong.stderr) == (2, "mjsense: no command 'sensrs'; did you mean 'sensors'?\n")
+
+
+def test_verify_says_nothing_of_a_recording_if_a_package_is_missing(tmp_path):
+    (tmp_path / "h5py.py").write_text("raise ModuleNotFoundError(\"No module named 'h5py'\", name='h5py')")
+    (tmp_path / "data").mkdir()
+    path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = run("verify", tmp_path / "data", PYTHONPATH=path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "mjsense: mjsense verify needs h5py: pip install 'mjsense[dataset]' (No module named 'h5py')\n"
 
 
 @pytest.mark.parametrize("words, message", [

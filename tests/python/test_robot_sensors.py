@@ -2,7 +2,6 @@
 """Sensors that a robot brings: [[sensors]] of its file, and those of mjs.Robot."""
 
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -126,7 +125,7 @@ def test_sensors_of_an_object():
 def test_program_names_a_class_that_is_not_found(robot, tmp_path):
     file = robot(PYTHON)
     words = ["record", "pick", "--robot", file, "--cameras", "none", "--out", tmp_path / "out"]
-    done = run_program(*words, stdin=subprocess.DEVNULL)  # a process of its own, without this one's sys.path
+    done = run_program(*words, alone=True)  # without the sys.path of this process
     assert done.returncode != 0
     assert "robot.toml: sensor 'grip': class 'lab_sensors:Grip' is not found: No module named 'lab_sensors'" in done.stderr
 

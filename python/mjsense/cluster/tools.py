@@ -19,6 +19,7 @@ from mjsense import _core
 from mjsense.cluster.index import write_index
 from mjsense.cluster.job import ShardResult
 from mjsense.cluster.storage import Storage
+from mjsense.core.optional import optional
 from mjsense.dataset import check
 from mjsense.dataset.files import INDEX, EpisodeEntry, entries_of, read_index
 from mjsense.dataset.remote import is_address, resolved
@@ -79,6 +80,7 @@ def verify(path: str, *, decode: bool = False, ffmpeg: str = "", progress: Calla
         progress: Called with a text after each file.
     """
     local, rows = _fetched(path)
+    optional("h5py", "dataset", "mjsense verify")
     found = json.loads(_core.verify(local, decode, ffmpeg, progress))
     damaged = {f["place"].split(" ")[0] for f in found["findings"] if f["error"]}
     found["findings"] += [{"error": True, "place": place, "text": text} for place, text in check.findings(local, damaged)]

@@ -23,7 +23,7 @@ from mjsense.dataset.render_cameras import check_frames, recorded_cameras
 from mjsense.dataset.streams import NUMBERS, REPLAY, VIDEOS, is_json
 from mjsense.dataset.video_decoder import Packets, have_av
 
-_REFUSALS = (ValueError, LookupError, OSError, RuntimeError, ImportError)
+_REFUSALS = (ValueError, LookupError, OSError, RuntimeError)
 _CACHE_BYTES = 1 << 26
 _OPTIONAL = ("replay/model/", "replay/held", "replay/changed")  # only in episodes that need them
 _NAME_BYTES = 100  # of the name of a video, padded with 0
