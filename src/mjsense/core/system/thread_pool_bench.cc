@@ -2,7 +2,7 @@
 // Benchmarks of ThreadPool.
 // pool/<us of work>/<us of pause>/<threads>: runs of 16 items in quick succession, after a pause.
 // Only the runs are timed.
-// run, run_near, tbb_static and tbb_auto/<items>/<us of each>: two threads, beside oneTBB.
+// run, run_near, tbb_static and tbb_auto/<items>/<us of each>: two threads, compared with oneTBB.
 
 #include <benchmark/benchmark.h>
 #include <tbb/parallel_for.h>
