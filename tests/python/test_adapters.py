@@ -202,10 +202,12 @@ def test_environments_of_mjlab(environment):
 def test_scripts_of_mjlab(environment, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("WANDB_MODE", "disabled")
+    monkeypatch.setenv("MUJOCO_GL", "disable")  # MuJoCo's own renderer is then an error
     python, program = environment("mjlab"), ("-m", "mjsense.compat.mjlab")
     run(python, *program, "list_envs")
     options = ("--env.scene.num-envs", "4", "--agent.max-iterations", "2", "--agent.logger", "tensorboard")
-    run(python, *program, "train", "Mjlab-Cartpole-Balance", *options)
+    run(python, *program, "train", "Mjlab-Cartpole-Balance", *options, "--video", "True", "--video-length", "20")
+    assert [*tmp_path.glob("logs/rsl_rl/*/*/videos/train/*.mp4")]
     assert [*tmp_path.glob("logs/rsl_rl/*/*/model_*.pt")]
 
 

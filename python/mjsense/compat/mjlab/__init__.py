@@ -22,7 +22,8 @@ TESTED = "1.6"
 
 
 def use(threads: int = 0) -> None:
-    """mjlab's environments on the CPU are stepped by mjsense from now on: ``mjsense.compat.mujoco_warp.use()``.
+    """mjlab's environments on the CPU are stepped by mjsense from now on: ``mjsense.compat.mujoco_warp.use()``. Their videos
+    (``render_mode="rgb_array"``) are drawn by ``mjsense.Renderer``, without OpenGL.
 
     Call it before an environment is made.
 
@@ -40,3 +41,17 @@ def use(threads: int = 0) -> None:
     from mjsense.compat import mujoco_warp
 
     mujoco_warp.use(threads)
+    _draw_videos_without_opengl()
+
+
+def _draw_videos_without_opengl() -> None:
+    from mjlab.viewer.offscreen_renderer import OffscreenRenderer  # pyright: ignore[reportMissingImports]
+
+    from mjsense.sim.renderer import Renderer
+
+    def initialize(self: OffscreenRenderer) -> None:
+        if self._renderer is not None:
+            raise RuntimeError("Renderer is already initialized. Call 'close()' first to reinitialize.")
+        self._renderer = Renderer(self._model, self._cfg.height, self._cfg.width)
+
+    OffscreenRenderer.initialize = initialize
