@@ -55,7 +55,7 @@ def main() -> None:
                 rates = [ours.rate(0), ours.rate(1)]
                 images = pathlib.Path(scratch) / "images.npz"
                 peer = run_peer(
-                    "warp_pbr", "warp_pbr_cameras", name, str(width), str(height), str(worlds), str(surroundings), str(images)
+                    "warp_pbr", "warp_cameras", name, str(width), str(height), str(worlds), str(surroundings), str(images)
                 )
                 case = f"{view.label}, {width}x{height}"
                 for rate, occlusion in zip(rates, ("with", "without")):

@@ -37,26 +37,13 @@ if TYPE_CHECKING:
     Size = tuple[int, int]  # width, height
     Made = tuple[Any, Callable[[], object], Callable[[], np.ndarray]]  # environment, its step, its image
 
-ENVIRONMENTS = (
-    "HalfCheetah-v5",
-    "Ant-v5",
-    "Humanoid-v5",
-    "Walker2d-v5",
-    "Pusher-v5",
-    "FetchPickAndPlace-v4",
-    "FrankaKitchen-v1",
-    "HandManipulateBlock-v1",
-    "AdroitHandDoor-v1",
-    "AdroitHandRelocate-v1",
-    "Meta-World/reach-v3",
-    "Meta-World/drawer-open-v3",
-    "gym_aloha/AlohaTransferCube-v0",
-    "dm_control/cheetah/run",
-    "dm_control/humanoid/stand",
-    "robosuite/Lift/agentview",
-    "robosuite/Lift/robot0_eye_in_hand",
-    "robosuite/PickPlace/agentview",
-    "robosuite/PickPlace/robot0_eye_in_hand",
+ENVIRONMENTS = tuple(
+    """
+    HalfCheetah-v5 Ant-v5 Humanoid-v5 Walker2d-v5 Pusher-v5 FetchPickAndPlace-v4 FrankaKitchen-v1 HandManipulateBlock-v1
+    AdroitHandDoor-v1 AdroitHandRelocate-v1 Meta-World/reach-v3 Meta-World/drawer-open-v3 gym_aloha/AlohaTransferCube-v0
+    dm_control/cheetah/run dm_control/humanoid/stand robosuite/Lift/agentview robosuite/Lift/robot0_eye_in_hand
+    robosuite/PickPlace/agentview robosuite/PickPlace/robot0_eye_in_hand
+    """.split()
 )
 
 

@@ -23,36 +23,11 @@ from typing import Any
 
 import numpy as np
 
-READ = [
-    "qpos",
-    "qvel",
-    "xpos",
-    "xquat",
-    "xipos",
-    "cvel",
-    "subtree_com",
-    "site_xpos",
-    "geom_xpos",
-    "sensordata",
-    "qacc",
-    "actuator_force",
-    "qfrc_actuator",
-    "ten_length",
-]
+READ = """
+    qpos qvel xpos xquat xipos cvel subtree_com site_xpos geom_xpos sensordata qacc actuator_force qfrc_actuator ten_length
+    """.split()
 """Arrays that mjlab's entities, sensors and tasks read."""
-STATE = [
-    "qpos",
-    "qvel",
-    "act",
-    "ctrl",
-    "qacc_warmstart",
-    "mocap_pos",
-    "mocap_quat",
-    "eq_active",
-    "xfrc_applied",
-    "qfrc_applied",
-    "time",
-]
+STATE = "qpos qvel act ctrl qacc_warmstart mocap_pos mocap_quat eq_active xfrc_applied qfrc_applied time".split()
 STEPS = (1, 50)
 SAME = 1e-3
 

@@ -35,27 +35,12 @@ TOKEN = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 TYPE = {"class", "struct", "union", "enum"}
-NOT_A_NAME = {
-    "if",
-    "for",
-    "while",
-    "switch",
-    "return",
-    "catch",
-    "sizeof",
-    "alignof",
-    "decltype",
-    "noexcept",
-    "requires",
-    "TEST",
-    "TEST_F",
-    "TEST_P",
-    "NB_MODULE",
-    "INSTANTIATE_TEST_SUITE_P",
-    "alignas",
-    "__attribute__",
-    "static_assert",
-}
+NOT_A_NAME = set(
+    """
+    if for while switch return catch sizeof alignof decltype noexcept requires TEST TEST_F TEST_P NB_MODULE
+    INSTANTIATE_TEST_SUITE_P alignas __attribute__ static_assert
+    """.split()
+)
 
 
 class Definition(NamedTuple):

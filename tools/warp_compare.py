@@ -122,24 +122,11 @@ def pair(scene: SceneOfCheck, worlds: int, device: str, reference: bool = True, 
     return mjs.Simulation(mjs.Scene(scene.make()), worlds, decimation) if reference else None, ours
 
 
-DERIVED = (
-    "xpos",
-    "xquat",
-    "xmat",
-    "xipos",
-    "ximat",
-    "geom_xpos",
-    "geom_xmat",
-    "site_xpos",
-    "site_xmat",
-    "cam_xpos",
-    "cam_xmat",
-    "light_xpos",
-    "light_xdir",
-    "subtree_com",
-    "cvel",
-    "qacc",
-    "sensordata",
+DERIVED = tuple(
+    """
+    xpos xquat xmat xipos ximat geom_xpos geom_xmat site_xpos site_xmat cam_xpos cam_xmat light_xpos light_xdir subtree_com
+    cvel qacc sensordata
+    """.split()
 )
 
 

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Images per CPU second of mujoco_warp's ray-traced cameras on the CPU, the renderer of mjlab's CameraSensor:
+"""Images per CPU second of mujoco_warp's ray-traced cameras on the CPU, the renderer of mjlab's CameraSensor, or of
+mujoco-warp-pbr's real-time tier:
 
-    warp_cameras VIEW WIDTH HEIGHT WORLDS shadows|plain images.npz
+    warp_cameras VIEW WIDTH HEIGHT WORLDS shadows|plain|SURROUNDINGS.hdr images.npz
 
-rgb and depth together, with textures, skybox and all lights, and with shadows if `shadows` is passed. The time includes the refit
-of its BVH and the images; as for mjsense, kinematics are computed before. rgb and depth of world 0 in frame 0 are written to
-images.npz.
+mujoco_warp: rgb and depth together, with textures, skybox and all lights, and with shadows if `shadows` is passed. With
+surroundings mujoco-warp-pbr: rgb with shadows, textures, all lights and the surroundings; one sample for each pixel, and no
+reflections in mirrors. The time includes the refit of the BVH and the images; as for mjsense, kinematics are computed before.
+The images of world 0 in frame 0 are written to images.npz.
 """
 
 import json
@@ -24,25 +26,31 @@ RUNS = 5
 
 def main() -> None:
     name, width, height, worlds = sys.argv[1], *map(int, sys.argv[2:5])
-    shadows, images = sys.argv[5] == "shadows", sys.argv[6]
+    light, images = sys.argv[5:7]
+    pbr = light.endswith(".hdr")
     wp.config.quiet = True
     view = camera_scenes.VIEWS[name]
     model = camera_scenes.compiled(view.scene)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    skybox = bool((model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX).any())
+    if pbr:
+        import mujoco_warp_pbr as renderer
+
+        options = {"render_depth": False, "render_seg": False, "envmap": light, "enable_reflections": False}
+    else:
+        renderer = mjw
+        skybox = bool((model.tex_type == mujoco.mjtTexture.mjTEXTURE_SKYBOX).any())
+        options = {"render_depth": True, "use_shadows": light == "shadows", "render_skybox": skybox}
     with wp.ScopedDevice("cpu"):
         m, d = mjw.put_model(model), mjw.put_data(model, data, nworld=worlds)
-        context = mjw.create_render_context(
+        context = renderer.create_render_context(
             model,
             nworld=worlds,
             cam_res=(width, height),
             render_rgb=True,
-            render_depth=True,
-            use_shadows=shadows,
-            render_skybox=skybox,
             enabled_geom_groups=list(camera_scenes.SHOWN_GROUPS),
             cam_active=[view.camera],
+            **options,
         )
         seconds = []
         for frame in range(RUNS + 1):
@@ -53,17 +61,20 @@ def main() -> None:
             mjw.com_pos(m, d)
             mjw.camlight(m, d)
             start = time.process_time()
-            mjw.refit_bvh(m, d, context)
-            mjw.render(m, d, context)
+            mjw.refit_bvh(m, d, context.base if pbr else context)
+            renderer.render(m, d, context)
             wp.synchronize()
             if frame:
                 seconds.append(time.process_time() - start)
                 continue
             rgb = wp.zeros((worlds, height, width), dtype=wp.vec3)
-            depth = wp.zeros((worlds, height, width), dtype=float)
-            mjw.get_rgb(context, 0, rgb)
-            mjw.get_depth(context, 0, 100.0, depth)  # divided by 100 m, then clamped to 1
-            np.savez(images, rgb=(255 * rgb.numpy()[0]).round().astype(np.uint8), depth=100 * depth.numpy()[0])
+            renderer.get_rgb(context, 0, rgb)
+            found = {"rgb": (255 * rgb.numpy()[0]).round().astype(np.uint8)}
+            if not pbr:
+                depth = wp.zeros((worlds, height, width), dtype=float)
+                mjw.get_depth(context, 0, 100.0, depth)  # divided by 100 m, then clamped to 1
+                found["depth"] = 100 * depth.numpy()[0]
+            np.savez(images, **found)
     print(json.dumps({"images_per_second": worlds / statistics.median(seconds)}))
 
 

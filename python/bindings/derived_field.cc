@@ -48,49 +48,16 @@ std::vector<DataField> data_fields(const mjModel* m) {
 
 // Fields that MuJoCo computes before accelerations, in the order of mjdata.h. All other fields may
 // require all stages.
-constexpr std::string_view kBeforeAccelerations[] = {"xpos",
-                                                     "xquat",
-                                                     "xmat",
-                                                     "xipos",
-                                                     "xiquat",
-                                                     "ximat",
-                                                     "xanchor",
-                                                     "xaxis",
-                                                     "geom_xpos",
-                                                     "geom_xquat",
-                                                     "geom_xmat",
-                                                     "site_xpos",
-                                                     "site_xquat",
-                                                     "site_xmat",
-                                                     "cam_xpos",
-                                                     "cam_xmat",
-                                                     "light_xpos",
-                                                     "light_xdir",
-                                                     "subtree_com",
-                                                     "cdof",
-                                                     "cinert",
-                                                     "flexvert_xpos",
-                                                     "flexelem_aabb",
-                                                     "flexedge_length",
-                                                     "ten_J",
-                                                     "ten_length",
-                                                     "actuator_length",
-                                                     "crb",
-                                                     "M",
-                                                     "qLD",
-                                                     "qLDiagInv",
-                                                     "ten_velocity",
-                                                     "cvel",
-                                                     "cdof_dot",
-                                                     "actuator_velocity",
-                                                     "qfrc_bias",
-                                                     "qfrc_spring",
-                                                     "qfrc_damper",
-                                                     "qfrc_gravcomp",
-                                                     "qfrc_fluid",
-                                                     "qfrc_adhesion",
-                                                     "qfrc_passive",
-                                                     "flexedge_velocity"};
+// clang-format off
+constexpr std::string_view kBeforeAccelerations[] = {
+    "xpos", "xquat", "xmat", "xipos", "xiquat", "ximat", "xanchor", "xaxis", "geom_xpos",
+    "geom_xquat", "geom_xmat", "site_xpos", "site_xquat", "site_xmat", "cam_xpos", "cam_xmat",
+    "light_xpos", "light_xdir", "subtree_com", "cdof", "cinert", "flexvert_xpos", "flexelem_aabb",
+    "flexedge_length", "ten_J", "ten_length", "actuator_length", "crb", "M", "qLD", "qLDiagInv",
+    "ten_velocity", "cvel", "cdof_dot", "actuator_velocity", "qfrc_bias", "qfrc_spring",
+    "qfrc_damper", "qfrc_gravcomp", "qfrc_fluid", "qfrc_adhesion", "qfrc_passive",
+    "flexedge_velocity"};
+// clang-format on
 
 class DerivedField final : public Sensor {
  public:

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Crafted malicious recordings: each case modifies a valid house (a folder of a recording) so that its contents are inconsistent.
 
-A case is a function of the house's folder; `CASES` maps names to cases. With any of them, no command may crash, hang, use
-excessive memory or access a file outside the folder, and `verify` must not report the recording as intact.
+A case is a function of the house's folder or, if its parameter is named `f`, of the opened file of the first batch; `CASES` maps
+names to cases. With any of them, no command may crash, hang, use excessive memory or access a file outside the folder, and `verify`
+must not report the recording as intact.
 """
 
+import inspect
 import json
 import os
 import struct
@@ -19,17 +21,29 @@ CASES = {}
 SECRET = "secret"  # a folder next to the house, which no command may access
 
 
+def of_house(function):
+    """The case as a function of the house."""
+    if next(iter(inspect.signature(function).parameters)) == "house":
+        return function
+
+    def call(house, *values):
+        with change(house) as f:
+            function(f, *values)
+
+    return call
+
+
 def case(function):
-    CASES[function.__name__] = function
+    CASES[function.__name__] = of_house(function)
     return function
 
 
 def variants(name, values):
-    """Adds one case for each value; the function takes the house and the value."""
+    """Adds one case for each value; the function takes the house, or its file, and the value."""
 
     def add(function):
         for key, value in values.items():
-            CASES[f"{name}_{key}"] = lambda house, value=value: function(house, value)
+            CASES[f"{name}_{key}"] = lambda house, value=value: of_house(function)(house, value)
         return function
 
     return add
@@ -63,27 +77,23 @@ ATTRIBUTES = {
 
 
 @variants("width_is", ATTRIBUTES)
-def _(house, value):
-    with change(house) as f:
-        f["traj_0/obs/sensor_data/wrist_camera"].attrs["width"] = value
+def _(f, value):
+    f["traj_0/obs/sensor_data/wrist_camera"].attrs["width"] = value
 
 
 @variants("crc32_is", ATTRIBUTES)
-def _(house, value):
-    with change(house) as f:
-        f["traj_0/rewards"].attrs["crc32"] = value
+def _(f, value):
+    f["traj_0/rewards"].attrs["crc32"] = value
 
 
 @variants("outcome_is", {k: v for k, v in ATTRIBUTES.items() if k not in ("text", "fixed_text")})
-def _(house, value):
-    with change(house) as f:
-        f["traj_0"].attrs["outcome"] = value
+def _(f, value):
+    f["traj_0"].attrs["outcome"] = value
 
 
 @variants("encoding_is", {k: v for k, v in ATTRIBUTES.items() if k not in ("text", "fixed_text")})
-def _(house, value):
-    with change(house) as f:
-        f["traj_0/obs/agent/qpos"].attrs["encoding"] = value
+def _(f, value):
+    f["traj_0/obs/agent/qpos"].attrs["encoding"] = value
 
 
 # ---- data sets with an unexpected type, shape or layout
@@ -104,27 +114,23 @@ SHAPES = {
 
 
 @variants("video_name_is", SHAPES)
-def _(house, create):
-    with change(house) as f:
-        replace(f["traj_0/obs/sensor_data"], "wrist_camera", **create)
+def _(f, create):
+    replace(f["traj_0/obs/sensor_data"], "wrist_camera", **create)
 
 
 @variants("success_is", SHAPES)
-def _(house, create):
-    with change(house) as f:
-        replace(f["traj_0"], "success", **create)
+def _(f, create):
+    replace(f["traj_0"], "success", **create)
 
 
 @variants("obs_scene_is", {k: v for k, v in SHAPES.items() if k != "text"})
-def _(house, create):
-    with change(house) as f:
-        replace(f["traj_0"], "obs_scene", **create)
+def _(f, create):
+    replace(f["traj_0"], "obs_scene", **create)
 
 
 @variants("rows_are", SHAPES)
-def _(house, create):
-    with change(house) as f:
-        replace(f["traj_0/obs/agent"], "qpos", **create)
+def _(f, create):
+    replace(f["traj_0/obs/agent"], "qpos", **create)
 
 
 # Types and layouts that no recorder writes, with the correct number of rows.
@@ -138,25 +144,22 @@ OF_STEPS = {
 
 
 @variants("rows_of", OF_STEPS)
-def _(house, create):
-    with change(house) as f:
-        replace(f["traj_0/obs/agent"], "qpos", **create(len(f["traj_0/success"])))
-        if f["traj_0/obs/agent/qpos"].shuffle:
-            f["traj_0/obs/agent/qpos"].id.write_direct_chunk((0, 0), b"\0\0")
+def _(f, create):
+    replace(f["traj_0/obs/agent"], "qpos", **create(len(f["traj_0/success"])))
+    if f["traj_0/obs/agent/qpos"].shuffle:
+        f["traj_0/obs/agent/qpos"].id.write_direct_chunk((0, 0), b"\0\0")
 
 
 @variants("success_of", {"nan": np.nan, "two_columns": [0, 0], "many_words": 7})
-def _(house, value):
-    with change(house) as f:
-        rows = np.array([value] * len(f["traj_0/success"]))
-        words = h5py.enum_dtype({f"v{i}": i for i in range(256)}, basetype="u1")
-        replace(f["traj_0"], "success", data=rows, dtype=words if np.all(rows == 7) else rows.dtype)
+def _(f, value):
+    rows = np.array([value] * len(f["traj_0/success"]))
+    words = h5py.enum_dtype({f"v{i}": i for i in range(256)}, basetype="u1")
+    replace(f["traj_0"], "success", data=rows, dtype=words if np.all(rows == 7) else rows.dtype)
 
 
 @variants("model_archive_is", {"outside": f"../../{SECRET}/keep.txt", "other": "model_00000000.zip", "number": 3, "escapes": "\x1b]0;x\x07"})
-def _(house, value):
-    with change(house) as f:
-        f.attrs["recording"] = json.dumps(json.loads(f.attrs["recording"]) | {"model_archive": value})
+def _(f, value):
+    f.attrs["recording"] = json.dumps(json.loads(f.attrs["recording"]) | {"model_archive": value})
 
 
 def archive_of(house):
@@ -183,25 +186,22 @@ def model_archive_is_a_pipe(house):
 
 
 @variants("recording_is", {"deep": "[" * 100_000, "words": "pick", "number": "3", "escapes": "\x1b]0;x\x07"})
-def _(house, text):
-    with change(house) as f:
-        del f.attrs["recording"]
-        f.attrs.create("recording", text[:60_000])
+def _(f, text):
+    del f.attrs["recording"]
+    f.attrs.create("recording", text[:60_000])
 
 
 @case
-def bool_of_eight_bytes(house):
-    with change(house) as f:
-        rows = len(f["traj_0/success"])
-        wide = h5py.enum_dtype({"FALSE": 0, "TRUE": 1}, basetype="i8")
-        replace(f["traj_0"], "success", data=np.zeros(rows, "i8"), dtype=wide)
+def bool_of_eight_bytes(f):
+    rows = len(f["traj_0/success"])
+    wide = h5py.enum_dtype({"FALSE": 0, "TRUE": 1}, basetype="i8")
+    replace(f["traj_0"], "success", data=np.zeros(rows, "i8"), dtype=wide)
 
 
 @case
-def chunk_of_four_gigabytes(house):
-    with change(house) as f:
-        rows = len(f["traj_0/success"])
-        replace(f["traj_0/obs/agent"], "qpos", shape=(rows, 10**9), dtype="u1", chunks=(1, 10**9))
+def chunk_of_four_gigabytes(f):
+    rows = len(f["traj_0/success"])
+    replace(f["traj_0/obs/agent"], "qpos", shape=(rows, 10**9), dtype="u1", chunks=(1, 10**9))
 
 
 def bomb(group, name, rows, width, packed):
@@ -213,57 +213,49 @@ def bomb(group, name, rows, width, packed):
 
 
 @case
-def gzip_bomb(house):
-    with change(house) as f:
-        bomb(f["traj_0/obs/agent"], "qpos", 4_000_000, 2000, zlib.compress(bytes(512 * 2000), 9))
+def gzip_bomb(f):
+    bomb(f["traj_0/obs/agent"], "qpos", 4_000_000, 2000, zlib.compress(bytes(512 * 2000), 9))
 
 
 @case
-def json_bomb(house):
+def json_bomb(f):
     row = b"[" * 40 + b"1," * 800 + b"1" + b"]" * 40
-    with change(house) as f:
-        bomb(f["traj_0/obs/agent"], "qpos", 1_000_000, 2000, zlib.compress(row.ljust(2000, b"\0") * 512, 9))
+    bomb(f["traj_0/obs/agent"], "qpos", 1_000_000, 2000, zlib.compress(row.ljust(2000, b"\0") * 512, 9))
 
 
 @case
-def chunk_that_is_no_gzip(house):
-    with change(house) as f:
-        f["traj_0/obs/agent/qpos"].id.write_direct_chunk((0, 0), b"not packed at all")
+def chunk_that_is_no_gzip(f):
+    f["traj_0/obs/agent/qpos"].id.write_direct_chunk((0, 0), b"not packed at all")
 
 
 @case
-def chunk_that_is_not_packed_and_short(house):
-    with change(house) as f:
-        rows = len(f["traj_0/success"])
-        dataset = replace(f["traj_0/obs/agent"], "qpos", shape=(rows, 100), dtype="f8", chunks=(rows, 100))
-        dataset.id.write_direct_chunk((0, 0), b"fifteen letters")
+def chunk_that_is_not_packed_and_short(f):
+    rows = len(f["traj_0/success"])
+    dataset = replace(f["traj_0/obs/agent"], "qpos", shape=(rows, 100), dtype="f8", chunks=(rows, 100))
+    dataset.id.write_direct_chunk((0, 0), b"fifteen letters")
 
 
 # ---- links
 
 
 @case
-def soft_cycle(house):
-    with change(house) as f:
-        f["traj_0/obs/agent/again"] = h5py.SoftLink("/traj_0/obs")
+def soft_cycle(f):
+    f["traj_0/obs/agent/again"] = h5py.SoftLink("/traj_0/obs")
 
 
 @case
-def soft_link_to_itself(house):
-    with change(house) as f:
-        f["traj_0/obs/agent/again"] = h5py.SoftLink("/traj_0/obs/agent/again")
+def soft_link_to_itself(f):
+    f["traj_0/obs/agent/again"] = h5py.SoftLink("/traj_0/obs/agent/again")
 
 
 @case
-def hard_cycle(house):
-    with change(house) as f:
-        f["traj_0/obs/agent/again"] = f["traj_0/obs"]
+def hard_cycle(f):
+    f["traj_0/obs/agent/again"] = f["traj_0/obs"]
 
 
 @case
-def dangling(house):
-    with change(house) as f:
-        f["traj_0/obs/agent/nowhere"] = h5py.SoftLink("/no/such/place")
+def dangling(f):
+    f["traj_0/obs/agent/nowhere"] = h5py.SoftLink("/no/such/place")
 
 
 def secret_file(house):
@@ -287,9 +279,8 @@ def external_trajectory(house):
 
 
 @case
-def external_storage(house):
-    with change(house) as f:
-        f["traj_0/obs/extra"].create_dataset("stolen", (100,), "u1", external=[("/etc/passwd", 0, 100)])
+def external_storage(f):
+    f["traj_0/obs/extra"].create_dataset("stolen", (100,), "u1", external=[("/etc/passwd", 0, 100)])
 
 
 @case
@@ -301,17 +292,15 @@ def virtual_storage(house):
 
 
 @case
-def deep_groups(house):
-    with change(house) as f:
-        group = f["traj_0/obs/extra"].id
-        for _ in range(20_000):
-            group = h5py.h5g.create(group, b"g")
+def deep_groups(f):
+    group = f["traj_0/obs/extra"].id
+    for _ in range(20_000):
+        group = h5py.h5g.create(group, b"g")
 
 
 @case
-def named_type(house):
-    with change(house) as f:
-        f["traj_0/obs/extra/type"] = np.dtype("f8")
+def named_type(f):
+    f["traj_0/obs/extra/type"] = np.dtype("f8")
 
 
 # ---- names of videos
@@ -349,16 +338,14 @@ def _(house, name):
 
 
 @case
-def key_of_escapes(house):
-    with change(house) as f:
-        f["traj_0/obs/sensor_data"].move("wrist_camera", "\x1b]0;title\x07")
-        f["traj_0/obs/extra"][b"\xff\xfe"] = np.zeros(3)
+def key_of_escapes(f):
+    f["traj_0/obs/sensor_data"].move("wrist_camera", "\x1b]0;title\x07")
+    f["traj_0/obs/extra"][b"\xff\xfe"] = np.zeros(3)
 
 
 @case
-def trajectory_of_a_far_number(house):
-    with change(house) as f:
-        f.move("traj_0", "traj_99999999999999999999")
+def trajectory_of_a_far_number(f):
+    f.move("traj_0", "traj_99999999999999999999")
 
 
 # ---- the file itself

@@ -30,6 +30,7 @@ class Program:
         self.model = mujoco.MjModel.from_xml_string(XML)
         self.worlds = _core.ForeignArrays(self.model._address, WORLDS, threads)
         self.worlds.clear(contacts, constraints)
+        self.kept = []  # the worlds use the memory of arrays
         start = mujoco.MjData(self.model)
         for name in (*STATE, *DERIVED):
             array = np.tile(np.ravel(getattr(start, name)).astype(np.float32), (WORLDS, 1))
@@ -59,6 +60,19 @@ class Program:
                 value = getattr(self, name)[world]
                 setattr(data, name, value[0] if name == "time" else value.reshape(np.shape(getattr(data, name))))
         return datas
+
+    def run_both(self, datas, call=STEP):
+        """The same call of the worlds and of plain MuJoCo."""
+        self.worlds.run(call)
+        for data in datas:
+            (mujoco.mj_forward if call == FORWARD else mujoco.mj_step)(self.model, data)
+
+    def add_model(self, name, rows=WORLDS):
+        """A field of the model with this number of rows, which the worlds use from now on."""
+        array = np.tile(np.ravel(getattr(self.model, name)).astype(np.float32), (rows, 1))
+        assert self.add("model", name, array)
+        self.kept.append(array)
+        return array
 
     def throw(self):
         """Writes a state for each world."""
@@ -90,9 +104,7 @@ def test_states_keep_double_precision_and_equal_plain_mujoco(threads):
     program.throw()
     datas = program.plain()
     for step in range(200):
-        program.worlds.run(STEP)
-        for data in datas:
-            mujoco.mj_step(program.model, data)
+        program.run_both(datas)
         program.expect(datas, f"step {step}")
     assert program.count[0, 0] == sum(data.ncon for data in datas) > WORLDS
 
@@ -109,9 +121,7 @@ def test_what_the_program_writes_is_taken_and_nothing_else():
         for world, data in enumerate(datas):
             program.ctrl[world, 0] = data.ctrl[0] = np.float32(np.sin(step + world))
             program.xfrc_applied[world, 8] = data.xfrc_applied[1, 2] = world
-        program.worlds.run(STEP)
-        for data in datas:
-            mujoco.mj_step(program.model, data)
+        program.run_both(datas)
         program.expect(datas, f"step {step}")
 
 
@@ -122,10 +132,8 @@ def test_steps_after_forward_equal_those_without_and_stages_may_be_divided():
         one.throw()
     datas = program.plain()
     for step in range(40):
-        program.worlds.run(FORWARD)
         divided.worlds.run(STEP1)
-        for data in datas:
-            mujoco.mj_forward(program.model, data)
+        program.run_both(datas, FORWARD)
         program.expect(datas, f"forward {step}")
         for world, data in enumerate(datas):
             program.ctrl[world, 0] = divided.ctrl[world, 0] = data.ctrl[0] = np.float32(0.1 * step)
@@ -133,10 +141,8 @@ def test_steps_after_forward_equal_those_without_and_stages_may_be_divided():
             program.qvel[0, 2] = datas[0].qvel[2] = 1
             divided.qvel[0, 2] = 1
             divided.worlds.run(STEP1)
-        program.worlds.run(STEP)
         divided.worlds.run(STEP2)
-        for data in datas:
-            mujoco.mj_step(program.model, data)
+        program.run_both(datas)
         program.expect(datas, f"step {step}")
         divided.expect(datas, f"divided step {step}")
 
@@ -169,12 +175,8 @@ def test_contacts_are_in_the_order_of_the_worlds():
     program.throw()
     datas = program.plain()
     for _ in range(120):
-        program.worlds.run(STEP)
-        for data in datas:
-            mujoco.mj_step(program.model, data)
-    program.worlds.run(FORWARD)
-    for data in datas:
-        mujoco.mj_forward(program.model, data)
+        program.run_both(datas)
+    program.run_both(datas, FORWARD)
     contacts = [(world, contact) for world, data in enumerate(datas) for contact in data.contact]
     assert program.count[0, 0] == len(contacts) > 2 * WORLDS
     for row, (world, contact) in enumerate(contacts):
@@ -198,15 +200,11 @@ def test_contacts_are_in_the_order_of_the_worlds():
 
 def test_models_differ_between_worlds_from_the_next_step_on():
     program = Program()
-    mass = np.tile(program.model.body_mass.astype(np.float32), (WORLDS, 1))
-    ipos = np.tile(np.ravel(program.model.body_ipos).astype(np.float32), (WORLDS, 1))
-    friction = np.ravel(program.model.geom_friction)[None].astype(np.float32)
+    mass, ipos, friction = (program.add_model(*field) for field in (("body_mass",), ("body_ipos",), ("geom_friction", 1)))
     gravity = program.model.opt.gravity[None].astype(np.float32)
-    # The program's own, which stay until it computes them itself.
-    derived = [np.ravel(getattr(program.model, name))[None].astype(np.float32) for name in ("body_invweight0", "dof_invweight0")]
-    arrays = {"body_mass": mass, "body_ipos": ipos, "geom_friction": friction, "opt.gravity": gravity}
-    for name, array in {**arrays, "body_invweight0": derived[0], "dof_invweight0": derived[1]}.items():
-        assert program.add("model", name, array)
+    assert program.add("model", "opt.gravity", gravity)
+    for name in ("body_invweight0", "dof_invweight0"):  # the program's own, which stay until it computes them itself
+        program.add_model(name, 1)
     program.throw()
     datas, models = program.plain(), [mujoco.MjModel.from_xml_string(XML) for _ in range(WORLDS)]
     for step in range(60):
@@ -233,9 +231,8 @@ def test_models_differ_between_worlds_from_the_next_step_on():
 @pytest.mark.parametrize("rows", [2, 3, WORLDS + 2])
 def test_worlds_share_the_rows_of_the_model_in_turn(rows):
     program = Program()
-    mass = np.tile(program.model.body_mass.astype(np.float32), (rows, 1))
+    mass = program.add_model("body_mass", rows)
     gravity = np.tile(program.model.opt.gravity.astype(np.float32), (rows, 1))
-    assert program.add("model", "body_mass", mass)
     assert program.add("model", "opt.gravity", gravity)
     program.throw()
     datas, models = program.plain(), [mujoco.MjModel.from_xml_string(XML) for _ in range(WORLDS)]
@@ -256,8 +253,7 @@ def test_worlds_share_the_rows_of_the_model_in_turn(rows):
 def test_one_row_for_all_worlds_replaces_the_values_of_each():
     program = Program()
     program.ctrl[:] = 1
-    mass = np.tile(program.model.body_mass.astype(np.float32), (WORLDS, 1))
-    assert program.add("model", "body_mass", mass)
+    mass = program.add_model("body_mass")
     mass[3, 1] = 2.5
     program.worlds.run(FORWARD)
     assert np.ptp(program.qacc[:, 6]) > 0
@@ -273,9 +269,8 @@ def test_one_row_for_all_worlds_replaces_the_values_of_each():
 @pytest.mark.parametrize("name", ["geom_bodyid", "geom_type"])
 def test_values_that_were_refused_are_not_used(name):
     program = Program()
-    mass = np.tile(program.model.body_mass.astype(np.float32), (WORLDS, 1))
+    mass = program.add_model("body_mass")
     array = np.array(getattr(program.model, name)[None])
-    assert program.add("model", "body_mass", mass)
     assert program.add("model", name, array)
     program.throw()
     datas = program.plain()
@@ -286,9 +281,7 @@ def test_values_that_were_refused_are_not_used(name):
             program.worlds.run(STEP)
     mass[2, 1], array[0, 1] = old
     for _ in range(30):
-        program.worlds.run(STEP)
-        for data in datas:
-            mujoco.mj_step(program.model, data)
+        program.run_both(datas)
         program.expect(datas)
 
 
@@ -360,29 +353,17 @@ def test_diverged_worlds_show_what_diverged_and_the_others_go_on():
     assert np.isfinite(program.qpos).all()
 
 
-def test_too_few_rows_are_an_error_that_says_how_many():
-    program = Program(contacts=3)
-    program.qpos[:, 2] = 0.099
-    with pytest.raises(ValueError, match=r"5 worlds have 20 contacts, and the data has room for 3: make it with nconmax=8 or more"):
-        program.worlds.run(STEP)
-    assert program.count[0, 0] == 3
-    program = Program(constraints=4)
-    program.qpos[:, 2] = 0.099
-    with pytest.raises(ValueError, match=r"world 0 has 16 rows of constraints, and the data has room for 4: make it with njmax=32"):
-        program.worlds.run(STEP)
-
-
-def test_no_rows_are_too_few_as_well():
-    """Arrays without rows are not linked."""
-    program = Program(contacts=0)
+@pytest.mark.parametrize(("contacts", "constraints"), [(3, 4), (0, 0)])  # arrays without rows are not linked
+def test_too_few_rows_are_an_error_that_says_how_many(contacts, constraints):
+    program = Program(contacts=contacts)
     program.worlds.run(STEP)
     program.qpos[:, 2] = 0.099
-    with pytest.raises(ValueError, match="5 worlds have 20 contacts, and the data has room for 0: make it with nconmax=8 or more"):
+    with pytest.raises(ValueError, match=f"5 worlds have 20 contacts, and the data has room for {contacts}: make it with nconmax=8 or more"):
         program.worlds.run(STEP)
-    assert program.count[0, 0] == 0
-    program = Program(constraints=0)
+    assert program.count[0, 0] == contacts
+    program = Program(constraints=constraints)
     program.qpos[:, 2] = 0.099
-    with pytest.raises(ValueError, match="world 0 has 16 rows of constraints, and the data has room for 0: make it with njmax=32"):
+    with pytest.raises(ValueError, match=f"world 0 has 16 rows of constraints, and the data has room for {constraints}: make it with njmax=32"):
         program.worlds.run(STEP)
 
 
@@ -608,9 +589,7 @@ def test_constants_are_those_of_mj_setconst(rows):
     program = Program()
     program.throw()
     outputs = ("body_subtreemass", "body_invweight0", "dof_invweight0")
-    arrays = {name: np.tile(np.ravel(getattr(program.model, name)).astype(np.float32), (rows, 1)) for name in ("body_mass", "body_ipos", *outputs)}
-    for name, array in arrays.items():
-        assert program.add("model", name, array)
+    arrays = {name: program.add_model(name, rows) for name in ("body_mass", "body_ipos", *outputs)}
     program.worlds.run(STEP)
     rng = np.random.default_rng(0)
     arrays["body_mass"] *= rng.uniform(0.5, 2, arrays["body_mass"].shape).astype(np.float32)

@@ -85,19 +85,12 @@ def test_image_options_are_those_of_cameras_and_of_render():
     assert set(given) <= inspect.signature(mjs.render).parameters.keys()
 
 
-PHYSICAL = {
-    "exposure",
-    "exposure_mode",
-    "exposure_time_constant",
-    "imager",
-    "motion_samples",
-    "tone_mapping",
-    "white_balance",
-    "environment",
-    "environment_intensity",
-    "environment_rotation",
-    "ambient_occlusion",
-}
+PHYSICAL = set(
+    """
+    exposure exposure_mode exposure_time_constant imager motion_samples tone_mapping white_balance environment
+    environment_intensity environment_rotation ambient_occlusion
+    """.split()
+)
 VALUES = {
     "shading": "pbr",
     "samples_per_pixel": 2,

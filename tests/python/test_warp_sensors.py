@@ -443,21 +443,10 @@ def test_a_nan_policy_raises():
 
 @pytest.mark.parametrize(
     "module",
-    [
-        "camera",
-        "camera_normals",
-        "contact_kernels",
-        "contact_lists",
-        "contact_memory",
-        "effect_errors",
-        "effect_timing",
-        "effects",
-        "kernels",
-        "lidar",
-        "pose_history",
-        "rays",
-        "terrain_height",
-    ],
+    """
+        camera camera_normals contact_kernels contact_lists contact_memory effect_errors effect_timing effects kernels lidar
+        pose_history rays terrain_height
+        """.split(),
 )
 @pytest.mark.filterwarnings("error:Generic kernels without overloads")  # Warp leaves them out
 def test_kernels_compile_for_cuda_devices(module, tmp_path):

@@ -23,23 +23,12 @@ from mjsense.tasks.record_job import PARTS, check_names, record_here
 
 _OF_RECORD = {"sensors", "progress", "format", "map", "trim_idle", "keep_recording", "ray"}
 """Arguments of ``record`` that do not decide the data."""
-_FREE = _OF_RECORD | {
-    "num_worlds",
-    "worlds",
-    "threads",
-    "episodes",
-    "max_attempts",
-    "attempts",
-    "first_attempt",
-    "num_attempts",
-    "shard",
-    "resume",
-    "append",
-    "overwrite",
-    "ffmpeg",
-    "batches",
-    "out",
-}
+_FREE = _OF_RECORD | set(
+    """
+    num_worlds worlds threads episodes max_attempts attempts first_attempt num_attempts shard resume append overwrite ffmpeg
+    batches out
+    """.split()
+)
 """Arguments of ``record`` that do not change the episodes, or that the driver sets."""
 
 

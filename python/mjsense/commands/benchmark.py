@@ -15,32 +15,11 @@ EXAMPLES = [
     ("mjsense benchmark check bench", "Check that the episodes of a benchmark start as when it was made."),
     ("mjsense benchmark export benchmark:pick --out theirs", "Write a benchmark as MolmoSpaces' benchmark.json."),
 ]
-_NOT_FIXED = (
-    "policy",
-    "threads",
-    "noise",
-    "resume",
-    "append",
-    "overwrite",
-    "house",
-    "batches",
-    "gzip",
-    "ffmpeg",
-    "crf",
-    "preset",
-    "tune",
-    "keyint",
-    "molmospaces_depth",
-    "max_attempts",
-    "num_attempts",
-    "first_attempt",
-    "attempts",
-    "shard",
-    "keep_failures",
-    "replay",
-    "videos",
-    "terminate_upon_success",
-    "worlds",
+_NOT_FIXED = tuple(
+    """
+    policy threads noise resume append overwrite house batches gzip ffmpeg crf preset tune keyint molmospaces_depth
+    max_attempts num_attempts first_attempt attempts shard keep_failures replay videos terminate_upon_success worlds
+    """.split()
 )
 
 

@@ -20,17 +20,10 @@ EXAMPLES = [
     ),
     ("mjsense evaluate benchmark:pick --policy planner --out results", "Evaluate the planner on a benchmark of the package."),
 ]
-_NOT_OFFERED = (
-    "noise",
-    "keep_failures",
-    "episodes",
-    "append",
-    "max_attempts",
-    "num_attempts",
-    "first_attempt",
-    "attempts",
-    "shard",
-    "terminate_upon_success",
+_NOT_OFFERED = tuple(
+    """
+    noise keep_failures episodes append max_attempts num_attempts first_attempt attempts shard terminate_upon_success
+    """.split()
 )
 _POLICIES = "planner, random, replay:DIR, lerobot:DIR, python:MODULE:CLASS, FILE.py:CLASS, ws://HOST:PORT"
 

@@ -19,18 +19,11 @@ from mjsense.sim import foreign_model
 _OTHER = ("qLD", "qLDiagInv", "qLU", "qH", "qHDiagInv")
 """Fields that have the names of fields of MuJoCo, with different contents."""
 
-_OPTIONS = (
-    "integrator",
-    "cone",
-    "solver",
-    "iterations",
-    "ls_iterations",
-    "noslip_iterations",
-    "ccd_iterations",
-    "sdf_initpoints",
-    "sdf_iterations",
-    "disableflags",
-    "enableflags",
+_OPTIONS = tuple(
+    """
+    integrator cone solver iterations ls_iterations noslip_iterations ccd_iterations sdf_initpoints sdf_iterations
+    disableflags enableflags
+    """.split()
 )
 """Options that are Python numbers in mujoco_warp, and equal in MuJoCo. Older series lack some."""
 

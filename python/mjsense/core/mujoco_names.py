@@ -17,20 +17,7 @@ from mjsense.core.errors import UnknownNameError
 if TYPE_CHECKING:
     import mujoco
 
-STATE = (
-    "time",
-    "qpos",
-    "qvel",
-    "act",
-    "ctrl",
-    "qfrc_applied",
-    "xfrc_applied",
-    "eq_active",
-    "mocap_pos",
-    "mocap_quat",
-    "qacc_warmstart",
-    "userdata",
-)
+STATE = tuple("time qpos qvel act ctrl qfrc_applied xfrc_applied eq_active mocap_pos mocap_quat qacc_warmstart userdata".split())
 """Fields of mjData that determine what sensors measure: the parts of ``sim.state``."""
 MAXVAL = 1e10
 """mjMAXVAL: larger limits mean none."""

@@ -87,46 +87,21 @@ class _Struct:
         return sorted({*object.__dir__(self), *self._fields})
 
 
-_KINDS = {
-    "actuator": "actuator",
-    "body": "body",
-    "cam": "cam",
+_SAME = "actuator body cam eq exclude flex geom hfield jnt key light mat mesh numeric pair sensor site skin tendon tex tuple"
+KINDS = {name: name for name in _SAME.split()} | {
     "camera": "cam",
-    "eq": "eq",
     "equality": "eq",
-    "exclude": "exclude",
-    "flex": "flex",
-    "geom": "geom",
-    "hfield": "hfield",
-    "jnt": "jnt",
     "joint": "jnt",
-    "key": "key",
     "keyframe": "key",
-    "light": "light",
-    "mat": "mat",
     "material": "mat",
-    "mesh": "mesh",
-    "numeric": "numeric",
-    "pair": "pair",
-    "sensor": "sensor",
-    "site": "site",
-    "skin": "skin",
     "ten": "tendon",
-    "tendon": "tendon",
-    "tex": "tex",
     "texture": "tex",
-    "tuple": "tuple",
 }
 """Methods that give an element by name or id, with the prefix of the fields of mjModel."""
-_DATA_KINDS = {
-    "actuator": "actuator",
+_DATA_KINDS = {name: name for name in ("actuator", "cam", "geom", "light", "site")} | {
     "body": "",
-    "cam": "cam",
-    "geom": "geom",
     "jnt": "",
-    "light": "light",
     "sensor": "",
-    "site": "site",
     "tendon": "ten",
 }
 """Kinds of elements that mjData knows, with the prefix of its fields."""
@@ -187,12 +162,12 @@ class _View(_Struct):
         )
 
     def __getattr__(self, name: str) -> Any:
-        if name in _KINDS and _KINDS[name] in self._element_kinds:
-            return lambda key: self._element(_KINDS[name], key)
+        if name in KINDS and KINDS[name] in self._element_kinds:
+            return lambda key: self._element(KINDS[name], key)
         return super().__getattr__(name)
 
     def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *(name for name, kind in _KINDS.items() if kind in self._element_kinds)})
+        return sorted({*super().__dir__(), *(name for name, kind in KINDS.items() if kind in self._element_kinds)})
 
     def _element(self, kind: str, key: str | int) -> _Element:
         names = self._model._names(kind)
@@ -215,7 +190,7 @@ class _View(_Struct):
 class MjModelView(_View):
     """An mjModel with the attributes of ``mujoco.MjModel``, for environments whose ``mujoco`` is of another series or missing."""
 
-    _element_kinds = frozenset(_KINDS.values())
+    _element_kinds = frozenset(KINDS.values())
 
     def __init__(self, owner: _core.OwnedModel) -> None:
         super().__init__(owner, _core.model_fields(owner.address))
@@ -250,46 +225,16 @@ class MjModelView(_View):
 
 
 _BODY = frozenset(
-    (
-        "xpos",
-        "xquat",
-        "xmat",
-        "xipos",
-        "xiquat",
-        "ximat",
-        "xfrc_applied",
-        "subtree_com",
-        "subtree_linvel",
-        "subtree_angmom",
-        "cinert",
-        "crb",
-        "cvel",
-        "cacc",
-        "cfrc_int",
-        "cfrc_ext",
-    )
+    """
+    xpos xquat xmat xipos xiquat ximat xfrc_applied subtree_com subtree_linvel subtree_angmom cinert crb cvel cacc
+    cfrc_int cfrc_ext
+    """.split()
 )
 _DOFS = frozenset(
-    (
-        "qvel",
-        "qacc",
-        "qacc_warmstart",
-        "qacc_smooth",
-        "qfrc_applied",
-        "qfrc_bias",
-        "qfrc_passive",
-        "qfrc_spring",
-        "qfrc_damper",
-        "qfrc_gravcomp",
-        "qfrc_fluid",
-        "qfrc_actuator",
-        "qfrc_smooth",
-        "qfrc_constraint",
-        "qfrc_inverse",
-        "cdof",
-        "cdof_dot",
-        "qLDiagInv",
-    )
+    """
+    qvel qacc qacc_warmstart qacc_smooth qfrc_applied qfrc_bias qfrc_passive qfrc_spring qfrc_damper qfrc_gravcomp
+    qfrc_fluid qfrc_actuator qfrc_smooth qfrc_constraint qfrc_inverse cdof cdof_dot qLDiagInv
+    """.split()
 )
 
 

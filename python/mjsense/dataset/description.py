@@ -22,22 +22,11 @@ from mjsense.dataset.places import is_plain_name, printable
 _RATE = re.compile(rf"[0-9]{{1,{RATE_DIGITS}}}(/[0-9]{{1,{RATE_DIGITS}}})?")
 _PRESETS = ("ultrafast", "superfast", "veryfast", "faster", "fast", "medium", "slow", "slower", "veryslow", "placebo")
 _TUNES = ("", "fastdecode", "zerolatency", "film", "animation", "grain", "stillimage", "psnr", "ssim")
-_PROVENANCE = (
-    "attempts",
-    "batches",
-    "episodes",
-    "first_attempt",
-    "first_batch",
-    "format",
-    "fps",
-    "gzip",
-    "house",
-    "model",
-    "model_archive",
-    "num_attempts",
-    "settings",
-    "streams",
-    "versions",
+_PROVENANCE = tuple(
+    """
+    attempts batches episodes first_attempt first_batch format fps gzip house model model_archive num_attempts settings
+    streams versions
+    """.split()
 )
 # A name of something that mjsense contains; a path has a dot, or begins with a slash.
 _KNOWN_THING = re.compile(r"[A-Za-z0-9_-]+(/[A-Za-z0-9_-]+)*(@[a-z]+)?(:[0-9]{1,9})?")

@@ -310,53 +310,50 @@ class EpisodeRows:
         videos = self._store.rows.get((self.index, "videos"), self._find_videos)
         # Opening a dataset takes most of the time. Arrays have the same type and attributes in all episodes of a recording.
         known = self._store.known.setdefault(self._entry.recording, {})
-
-        def visit(place: str) -> None:
-            if place not in known:
-                add(place)
-            elif (stream := known[place]) is not None:
-                streams[stream.name] = stream
-
-        def add(place: str) -> None:
-            if place in ("obs_scene", REPLAY + "held") or place.startswith(REPLAY + "model/"):
-                known[place] = None
-                return
-            dataset = trajectory[place]
-            if isinstance(dataset, Group) or not (dataset.is_number and dataset.shape):
-                known[place] = None  # a group, or nothing that a stream can be
-                return
-            about = {key: dataset.attrs.text(key) for key in ("unit", "frame", "description")}
-            name = place.removeprefix(NUMBERS)
-            check_known(name, dataset)
-            if name.startswith(VIDEOS):
-                if name in videos:
-                    info = videos[name]
-                    dtype = np.dtype(np.uint8 if info.encoding == "rgb" else np.float32)
-                    streams[name] = Stream(name, dtype, info.shape, about["unit"], about["frame"], about["description"], "video")
-            elif is_json(dataset):
-                if NUMBERS + name in trajectory:
-                    known[place] = None
-                    return
-                for leaf, values in self._decode(name, dataset).items():
-                    unit = unit_of(about["unit"], leaf[len(name) + 1 :])
-                    streams[leaf] = Stream(
-                        leaf, values.dtype, values.shape[1:], unit, about["frame"], about["description"], "json"
-                    )
-                    if mask := given_name(leaf):
-                        streams[mask] = Stream(
-                            mask, np.dtype(bool), (), "", "", f"Whether {leaf} is given; if not, it is 0.", "json"
-                        )
-            else:
-                if is_mask(name) and dataset.dtype != bool:
-                    raise ValueError(f"{dataset.where} is {dataset.dtype}; it must be bool, whether each action is given")
-                stream = Stream(name, dataset.dtype, dataset.shape[1:], about["unit"], about["frame"], about["description"])
-                streams[name] = known[place] = stream
-
         with open_h5(self.path) as file:
             trajectory = file[self.trajectory]
             for place in trajectory.datasets():
-                visit(place)
+                if place not in known:
+                    streams |= {stream.name: stream for stream in self._streams_at(place, trajectory, videos, known)}
+                elif (stream := known[place]) is not None:
+                    streams[stream.name] = stream
         return dict(sorted(streams.items())), 500 * len(streams)
+
+    def _streams_at(
+        self, place: str, trajectory: Group, videos: dict[str, VideoInfo], known: dict[str, Stream | None]
+    ) -> list[Stream]:
+        """The streams of a dataset; adds to ``known`` what it is in all episodes of the recording, unless they can differ."""
+        read_elsewhere = place in ("obs_scene", REPLAY + "held") or place.startswith(REPLAY + "model/")
+        dataset = None if read_elsewhere else trajectory[place]
+        if dataset is None or isinstance(dataset, Group) or not (dataset.is_number and dataset.shape):
+            known[place] = None  # nothing that a stream can be
+            return []
+        about = {key: dataset.attrs.text(key) for key in ("unit", "frame", "description")}
+        name = place.removeprefix(NUMBERS)
+        check_known(name, dataset)
+        if name.startswith(VIDEOS):
+            if (info := videos.get(name)) is None:
+                return []
+            return [Stream(name, np.dtype(np.uint8 if info.encoding == "rgb" else np.float32), info.shape, **about, kind="video")]
+        if is_json(dataset):
+            if NUMBERS + name in trajectory:
+                known[place] = None
+                return []
+            return self._json_streams(name, dataset, about)
+        if is_mask(name) and dataset.dtype != bool:
+            raise ValueError(f"{dataset.where} is {dataset.dtype}; it must be bool, whether each action is given")
+        known[place] = stream = Stream(name, dataset.dtype, dataset.shape[1:], **about)
+        return [stream]
+
+    def _json_streams(self, name: str, dataset: Rows, about: dict[str, str]) -> list[Stream]:
+        """A stream for each leaf of a dataset of JSON rows, and one for its mask if it has one."""
+        streams = []
+        for leaf, values in self._decode(name, dataset).items():
+            unit = unit_of(about["unit"], leaf[len(name) + 1 :])
+            streams.append(Stream(leaf, values.dtype, values.shape[1:], **about | {"unit": unit}, kind="json"))
+            if mask := given_name(leaf):
+                streams.append(Stream(mask, np.dtype(bool), (), "", "", f"Whether {leaf} is given; if not, it is 0.", "json"))
+        return streams
 
     def _decode(self, place: str, dataset: Any) -> dict[str, np.ndarray]:
         """Arrays of the leaves of a dataset of JSON rows; they and their masks are cached."""

@@ -33,26 +33,11 @@ MAX_NUMBERS = 1 << 26
 """Of one array of an episode; it has 512 MiB."""
 MAX_SUBSTEPS = 100_000
 _INVERSES = ("invweight0", "acc0")
-_PARTS = (
-    "qpos0",
-    "qpos_spring",
-    "body_",
-    "jnt_",
-    "dof_",
-    "geom_",
-    "site_",
-    "cam_",
-    "light_",
-    "flex_",
-    "flexedge_",
-    "mat_",
-    "pair_",
-    "eq_",
-    "tendon_",
-    "wrap_prm",
-    "actuator_",
-    "sensor_",
-    "key_",
+_PARTS = tuple(
+    """
+    qpos0 qpos_spring body_ jnt_ dof_ geom_ site_ cam_ light_ flex_ flexedge_ mat_ pair_ eq_ tendon_ wrap_prm actuator_
+    sensor_ key_
+    """.split()
 )
 """Beginnings of the names of fields that may differ between worlds."""
 _RANGES = {

@@ -28,21 +28,11 @@ quarter of it."""
 
 _FACTORS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40, "P": 1 << 50, "E": 1 << 60}
 _DOFS = {"free": 6, "ball": 3}
-_ACTUATORS = {
-    "general",
-    "motor",
-    "position",
-    "velocity",
-    "intvelocity",
-    "orientation",
-    "pid",
-    "damper",
-    "cylinder",
-    "muscle",
-    "adhesion",
-    "dcmotor",
-    "plugin",
-}
+_ACTUATORS = set(
+    """
+    general motor position velocity intvelocity orientation pid damper cylinder muscle adhesion dcmotor plugin
+    """.split()
+)
 _LIMITS: dict[str, dict[str, int]] = {
     "option": dict.fromkeys(
         ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations", "sdf_iterations", "sdf_initpoints"), 10_000

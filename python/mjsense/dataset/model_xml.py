@@ -37,25 +37,12 @@ _ELEMENTS = {
 }
 _RENAMED = {"eq_data": "data", "eq_active0": "active", "actuator_ctrlrange": "ctrlrange"}
 # The compiler computes these from the others.
-_DERIVED = {
-    "body_invweight0",
-    "body_subtreemass",
-    "bvh_aabb",
-    "dof_M0",
-    "dof_invweight0",
-    "geom_aabb",
-    "geom_rbound",
-    "actuator_acc0",
-    "actuator_length0",
-    "tendon_length0",
-    "tendon_invweight0",
-    "cam_pos0",
-    "cam_poscom0",
-    "cam_mat0",
-    "light_pos0",
-    "light_poscom0",
-    "light_dir0",
-}
+_DERIVED = set(
+    """
+    body_invweight0 body_subtreemass bvh_aabb dof_M0 dof_invweight0 geom_aabb geom_rbound actuator_acc0 actuator_length0
+    tendon_length0 tendon_invweight0 cam_pos0 cam_poscom0 cam_mat0 light_pos0 light_poscom0 light_dir0
+    """.split()
+)
 _INERTIAL = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
 _MESH = int(mujoco.mjtGeom.mjGEOM_MESH) if mujoco else -1
 

@@ -218,18 +218,7 @@ def _starts(options: Mapping[str, Any]) -> tuple[list[np.ndarray], list[str]]:
         env.close()
 
 
-_STARTS = (
-    "task",
-    "robot",
-    "scene",
-    "split",
-    "arm_controller",
-    "camera_system",
-    "cameras",
-    "policy_dt_ms",
-    "perturb",
-    "instructions",
-)
+_STARTS = tuple("task robot scene split arm_controller camera_system cameras policy_dt_ms perturb instructions".split())
 """Options on which the start of an episode depends."""
 
 

@@ -20,48 +20,15 @@ _IDS = {
     "mat_texid": "ntex",
 }
 """Model fields that contain ids which sensors resolve, and the mjModel size that bounds each."""
-_WHOLE = {
-    "geom_contype",
-    "geom_conaffinity",
-    "geom_condim",
-    "geom_priority",
-    "geom_group",
-    "geom_matid",
-    "geom_castshadow",
-    "geom_dataid",
-    "site_group",
-    "site_matid",
-    "jnt_group",
-    "jnt_limited",
-    "jnt_actfrclimited",
-    "jnt_actgravcomp",
-    "light_active",
-    "light_castshadow",
-    "light_type",
-    "cam_projection",
-    "flex_contype",
-    "flex_conaffinity",
-    "flex_condim",
-    "flex_priority",
-    "flex_group",
-    "flex_matid",
-    "flex_selfcollide",
-    "skin_group",
-    "skin_matid",
-    "mat_texid",
-    "mat_texuniform",
-    "eq_active0",
-    "tendon_group",
-    "tendon_matid",
-    "tendon_limited",
-    "tendon_actfrclimited",
-    "actuator_group",
-    "actuator_ctrllimited",
-    "actuator_forcelimited",
-    "actuator_actlimited",
-    "actuator_actearly",
-    "geom_type",
-}
+_WHOLE = set(
+    """
+    geom_contype geom_conaffinity geom_condim geom_priority geom_group geom_matid geom_castshadow geom_dataid site_group
+    site_matid jnt_group jnt_limited jnt_actfrclimited jnt_actgravcomp light_active light_castshadow light_type cam_projection
+    flex_contype flex_conaffinity flex_condim flex_priority flex_group flex_matid flex_selfcollide skin_group skin_matid
+    mat_texid mat_texuniform eq_active0 tendon_group tendon_matid tendon_limited tendon_actfrclimited actuator_group
+    actuator_ctrllimited actuator_forcelimited actuator_actlimited actuator_actearly geom_type
+    """.split()
+)
 """Integer and boolean model fields that may differ between worlds. All others are sizes and addresses, which MuJoCo uses to index
 memory."""
 _FIXED = {

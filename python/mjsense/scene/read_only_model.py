@@ -14,46 +14,8 @@ import numpy as np
 from mjsense.core import libmujoco, mujoco_views
 from mjsense.scene.randomizable import is_randomizable
 
-_ELEMENTS = (
-    "actuator",
-    "bind",
-    "body",
-    "cam",
-    "camera",
-    "eq",
-    "equality",
-    "exclude",
-    "geom",
-    "hfield",
-    "jnt",
-    "joint",
-    "key",
-    "keyframe",
-    "light",
-    "mat",
-    "material",
-    "mesh",
-    "numeric",
-    "pair",
-    "sensor",
-    "site",
-    "skin",
-    "ten",
-    "tendon",
-    "tex",
-    "texture",
-    "tuple",
-)
-_FIELDS = {
-    "camera": "cam",
-    "equality": "eq",
-    "joint": "jnt",
-    "keyframe": "key",
-    "material": "mat",
-    "ten": "tendon",
-    "texture": "tex",
-}
-"""Methods whose elements' fields have another prefix in mjModel."""
+_ELEMENTS = {**mujoco_views.KINDS, "bind": "bind"}
+"""Methods that give elements, with the prefix of their fields in mjModel."""
 
 
 def refuse(model: Any, field: str) -> NoReturn:
@@ -122,7 +84,7 @@ def _read_only_class() -> Any:
     base = libmujoco.shared.MjModel
 
     def element(name: str) -> Any:
-        method, prefix = getattr(base, name), f"{_FIELDS.get(name, name)}_"
+        method, prefix = getattr(base, name), f"{_ELEMENTS[name]}_"
 
         @functools.wraps(method)
         def call(self: Any, *args: Any, **kwargs: Any) -> Any:
@@ -160,7 +122,7 @@ class _ReadOnlyView(mujoco_views.MjModelView):
         if isinstance(value, mujoco_views._Struct):
             return _Part(self, value, f"{name}.")
         if name in _ELEMENTS and callable(value):
-            return lambda key: _Part(self, value(key), f"{_FIELDS.get(name, name)}_")
+            return lambda key: _Part(self, value(key), f"{_ELEMENTS[name]}_")
         return frozen(value)
 
     def __setattr__(self, name: str, value: Any) -> NoReturn:

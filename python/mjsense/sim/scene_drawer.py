@@ -15,24 +15,23 @@ from mjsense.sim import scene_layout
 if TYPE_CHECKING:
     import mujoco
 
-# fmt: off
-_MODEL_ARRAYS = (
-    "mesh_vertadr", "mesh_vertnum", "mesh_faceadr", "mesh_facenum", "mesh_normaladr", "mesh_normalnum", "mesh_texcoordadr",
-    "mesh_texcoordnum", "mesh_graphadr", "mesh_vert", "mesh_normal", "mesh_texcoord", "mesh_face", "mesh_facenormal",
-    "mesh_facetexcoord",
-    "mesh_graph", "hfield_adr", "hfield_nrow", "hfield_ncol", "hfield_size", "hfield_data", "skin_vertadr", "skin_vertnum",
-    "skin_texcoordadr", "skin_faceadr", "skin_facenum", "skin_vert", "skin_texcoord", "skin_face", "tex_adr", "tex_type",
-    "tex_width",
-    "tex_height", "tex_nchannel", "tex_colorspace", "tex_data", "mat_texid", "mat_texuniform", "mat_texrepeat",
-    "mat_metallic", "mat_roughness", "light_type", "light_texid", "light_active",
+_MODEL_ARRAYS = tuple(
+    """
+    mesh_vertadr mesh_vertnum mesh_faceadr mesh_facenum mesh_normaladr mesh_normalnum mesh_texcoordadr mesh_texcoordnum
+    mesh_graphadr mesh_vert mesh_normal mesh_texcoord mesh_face mesh_facenormal mesh_facetexcoord mesh_graph hfield_adr
+    hfield_nrow hfield_ncol hfield_size hfield_data skin_vertadr skin_vertnum skin_texcoordadr skin_faceadr skin_facenum
+    skin_vert skin_texcoord skin_face tex_adr tex_type tex_width tex_height tex_nchannel tex_colorspace tex_data mat_texid
+    mat_texuniform mat_texrepeat mat_metallic mat_roughness light_type light_texid light_active
+    """.split()
 )
 """The model's arrays that an image depends on and that are not in the abstract scene."""
 
-_SCENE_ARRAYS = (
-    "flexedgeadr", "flexedgenum", "flexedge", "flexvertadr", "flexvertnum", "flexfaceadr", "flexfaceused", "flexvert", "flexface",
-    "flexnormal", "flextexcoord", "skinfacenum", "skinvertadr", "skinvertnum", "skinvert", "skinnormal",
+_SCENE_ARRAYS = tuple(
+    """
+    flexedgeadr flexedgenum flexedge flexvertadr flexvertnum flexfaceadr flexfaceused flexvert flexface flexnormal
+    flextexcoord skinfacenum skinvertadr skinvertnum skinvert skinnormal
+    """.split()
 )
-# fmt: on
 
 # Flags of renderer.scene.flags (mjtRndFlag) by their effect here.
 _REFUSED_IF_SET = ("mjRND_WIREFRAME", "mjRND_ADDITIVE", "mjRND_DEPTH", "mjRND_SEGMENT", "mjRND_IDCOLOR")

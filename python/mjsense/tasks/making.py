@@ -15,27 +15,12 @@ from mjsense.tasks.env import TaskEnv
 from mjsense.tasks.parts import Policies, Robots, Scenes, Tasks, parts_of
 from mjsense.tasks.vector import TaskVectorEnv, checked_episodes
 
-_WITH_WARP = {
-    "task",
-    "num_envs",
-    "seed",
-    "horizon",
-    "policy_dt_ms",
-    "terminate_upon_success",
-    "observations",
-    "sensors",
-    "use_sensors",
-    "instructions",
-    "shadows",
-    "meshes",
-    "autoreset_mode",
-    "action_space",
-    "episodes",
-    "backend",
-    "device",
-    "nconmax",
-    "njmax",
-}
+_WITH_WARP = set(
+    """
+    task num_envs seed horizon policy_dt_ms terminate_upon_success observations sensors use_sensors instructions shadows
+    meshes autoreset_mode action_space episodes backend device nconmax njmax
+    """.split()
+)
 """Arguments of make_vec() that have an effect, or no meaning, with backend="warp"."""
 
 

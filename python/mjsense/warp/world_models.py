@@ -16,22 +16,11 @@ from mjsense import _core
 from mjsense.core.errors import did_you_mean
 from mjsense.warp import physics
 
-_SET_CONST = (
-    "body_subtreemass",
-    "geom_aabb",
-    "geom_rbound",
-    "tendon_length0",
-    "eq_data",
-    "cam_pos0",
-    "cam_poscom0",
-    "cam_mat0",
-    "light_pos0",
-    "light_poscom0",
-    "light_dir0",
-    "dof_invweight0",
-    "body_invweight0",
-    "tendon_invweight0",
-    "actuator_acc0",
+_SET_CONST = tuple(
+    """
+    body_subtreemass geom_aabb geom_rbound tendon_length0 eq_data cam_pos0 cam_poscom0 cam_mat0 light_pos0 light_poscom0
+    light_dir0 dof_invweight0 body_invweight0 tendon_invweight0 actuator_acc0
+    """.split()
 )
 """Fields of the model that mujoco_warp.set_const computes, and that need a row per world then."""
 

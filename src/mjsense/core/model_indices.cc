@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <string_view>
 
+#include "mjsense/core/element_count.h"
 #include "mjsense/core/error.h"
 
 namespace mjsense {
@@ -87,40 +88,6 @@ void check_ids(const mjModel& m, const std::vector<IdField>& fields) {
     check_range(f.name, m.*f.ids, 0, m.*f.rows * f.columns, f.lowest, m.*f.count);
 }
 
-std::int64_t count_of(const mjModel& m, int type) {
-  switch (type) {
-    case mjOBJ_BODY:
-    case mjOBJ_XBODY:
-      return m.nbody;
-    case mjOBJ_JOINT:
-      return m.njnt;
-    case mjOBJ_DOF:
-      return m.nv;
-    case mjOBJ_GEOM:
-      return m.ngeom;
-    case mjOBJ_SITE:
-      return m.nsite;
-    case mjOBJ_CAMERA:
-      return m.ncam;
-    case mjOBJ_LIGHT:
-      return m.nlight;
-    case mjOBJ_FLEX:
-      return m.nflex;
-    case mjOBJ_MESH:
-      return m.nmesh;
-    case mjOBJ_TENDON:
-      return m.ntendon;
-    case mjOBJ_ACTUATOR:
-      return m.nactuator;
-    case mjOBJ_EQUALITY:
-      return m.neq;
-    case mjOBJ_PLUGIN:
-      return m.nplugin;
-    default:
-      return 0;
-  }
-}
-
 // Ids whose meaning depends on a type.
 void check_typed_ids(const mjModel& m) {
   for (int i = 0; m.geom_type && m.geom_dataid && i < m.ngeom; ++i) {
@@ -137,7 +104,7 @@ void check_typed_ids(const mjModel& m) {
     const bool joints = m.eq_type[i] == mjEQ_JOINT;
     const std::int64_t end = joints                        ? m.njnt
                              : m.eq_type[i] == mjEQ_TENDON ? m.ntendon
-                             : m.eq_type[i] <= mjEQ_WELD   ? count_of(m, m.eq_objtype[i])
+                             : m.eq_type[i] <= mjEQ_WELD   ? count_of(&m, m.eq_objtype[i])
                                                            : m.nflex;
     check_range("eq_obj1id", m.eq_obj1id, i, 1, 0, end);
     if (m.eq_type[i] <= mjEQ_TENDON) check_range("eq_obj2id", m.eq_obj2id, i, 1, -1, end);
@@ -163,9 +130,9 @@ void check_typed_ids(const mjModel& m) {
       check_range("actuator_trnid", m.actuator_trnid, 2 * i + 1, 1, -1, end);
   }
   for (int i = 0; m.sensor_objtype && m.sensor_objid && i < m.nsensor; ++i) {
-    if (const std::int64_t end = count_of(m, m.sensor_objtype[i]))
+    if (const int end = count_of(&m, m.sensor_objtype[i]))
       check_range("sensor_objid", m.sensor_objid, i, 1, -1, end);
-    if (const std::int64_t end = count_of(m, m.sensor_reftype[i]))
+    if (const int end = count_of(&m, m.sensor_reftype[i]))
       check_range("sensor_refid", m.sensor_refid, i, 1, -1, end);
   }
 }

@@ -10,12 +10,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
-#include <filesystem>
 #include <map>
 #include <ostream>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -336,37 +332,6 @@ TEST(CompilerSettings, SettingsOfTheBaseDoNotAffectEntities) {
                bounded = compile_text(robot("boundmass='.5'"), kAssets)->body_subtreemass[0];
   EXPECT_GT(bounded, plain + .5);
   EXPECT_NEAR(scene("boundmass='.5'", false), plain + bounded, 1e-9);
-}
-
-// All models in the folders MJSENSE_TEST_MODELS (separated by ':') that MuJoCo can load.
-TEST(CompilerSettings, ModelsOfFolders) {
-  const char* folders = std::getenv("MJSENSE_TEST_MODELS");
-  if (!folders) GTEST_SKIP() << "MJSENSE_TEST_MODELS is not set";
-  std::stringstream list(folders);
-  int tested = 0;
-  for (std::string folder; std::getline(list, folder, ':');) {
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
-      const std::string path = entry.path().string();
-      if (entry.path().extension() != ".xml") continue;
-      char error[1000];
-      const ModelPtr alone(mj_loadXML(path.c_str(), nullptr, error, sizeof error));
-      if (!alone) continue;
-      SCOPED_TRACE(path);
-      try {
-        SceneCfg cfg;
-        cfg.entities = {{"plain", {.model = {.xml = robot(""), .assets = kAssets}}},
-                        {"e", {.model = {.path = path}, .mocap_base = false}}};
-        const Scene scene(std::move(cfg));
-        Compare{alone.get(), scene.model(), "e/", 1e-9}.run();
-        const double mass = alone->body_subtreemass[0] - alone->body_mass[0];
-        std::printf("%s: %.6g kg\n", path.c_str(), mass);
-        ++tested;
-      } catch (const std::exception& e) {
-        std::printf("%s: %s\n", path.c_str(), e.what());
-      }
-    }
-  }
-  std::printf("%d models\n", tested);
 }
 
 TEST(CompilerSettings, OnlyEffectiveSettingsAreApplied) {

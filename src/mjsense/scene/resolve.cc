@@ -5,6 +5,7 @@
 
 #include <utility>
 
+#include "mjsense/core/element_count.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/named.h"
 #include "mjsense/scene/scene.h"
@@ -51,58 +52,8 @@ std::vector<std::string> model_names(const mjModel* model, mjtObj type) {
   return names;
 }
 
-int count_of(const mjModel* m, mjtObj type) {
-  switch (type) {
-    case mjOBJ_BODY:
-    case mjOBJ_XBODY:
-      return static_cast<int>(m->nbody);
-    case mjOBJ_JOINT:
-      return static_cast<int>(m->njnt);
-    case mjOBJ_GEOM:
-      return static_cast<int>(m->ngeom);
-    case mjOBJ_SITE:
-      return static_cast<int>(m->nsite);
-    case mjOBJ_CAMERA:
-      return static_cast<int>(m->ncam);
-    case mjOBJ_LIGHT:
-      return static_cast<int>(m->nlight);
-    case mjOBJ_FLEX:
-      return static_cast<int>(m->nflex);
-    case mjOBJ_MESH:
-      return static_cast<int>(m->nmesh);
-    case mjOBJ_SKIN:
-      return static_cast<int>(m->nskin);
-    case mjOBJ_HFIELD:
-      return static_cast<int>(m->nhfield);
-    case mjOBJ_TEXTURE:
-      return static_cast<int>(m->ntex);
-    case mjOBJ_MATERIAL:
-      return static_cast<int>(m->nmat);
-    case mjOBJ_PAIR:
-      return static_cast<int>(m->npair);
-    case mjOBJ_EXCLUDE:
-      return static_cast<int>(m->nexclude);
-    case mjOBJ_EQUALITY:
-      return static_cast<int>(m->neq);
-    case mjOBJ_TENDON:
-      return static_cast<int>(m->ntendon);
-    case mjOBJ_ACTUATOR:
-      return static_cast<int>(m->nactuator);
-    case mjOBJ_SENSOR:
-      return static_cast<int>(m->nsensor);
-    case mjOBJ_NUMERIC:
-      return static_cast<int>(m->nnumeric);
-    case mjOBJ_TEXT:
-      return static_cast<int>(m->ntext);
-    case mjOBJ_TUPLE:
-      return static_cast<int>(m->ntuple);
-    case mjOBJ_KEY:
-      return static_cast<int>(m->nkey);
-    case mjOBJ_PLUGIN:
-      return static_cast<int>(m->nplugin);
-    default:
-      return 0;
-  }
+int count_of(const mjModel* model, mjtObj type) {
+  return mjsense::count_of(model, static_cast<int>(type));
 }
 
 int resolve(const mjModel* model, mjtObj type, std::string_view full_name,

@@ -7,11 +7,8 @@
 #include <mujoco/mjxmacro.h>
 
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/testing/temp_dir.h"
@@ -224,37 +221,6 @@ TEST(RoundTrip, GeneratedTerrain) {
       {"a",
        xml("<mujoco><worldbody><body><freejoint/><geom size='.1'/></body></worldbody></mujoco>")}};
   expect_round_trip(Scene(std::move(cfg)));
-}
-
-// All models in the folders MJSENSE_TEST_MODELS (separated by ':') that MuJoCo can load, each
-// attached twice to one scene.
-TEST(RoundTrip, ModelsOfFolders) {
-  const char* folders = std::getenv("MJSENSE_TEST_MODELS");
-  if (!folders) GTEST_SKIP() << "MJSENSE_TEST_MODELS is not set";
-  std::stringstream list(folders);
-  int tested = 0;
-  for (std::string folder; std::getline(list, folder, ':');) {
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder)) {
-      if (entry.path().extension() != ".xml") continue;
-      const std::string path = entry.path().string();
-      char error[1000];
-      ModelPtr plain(mj_loadXML(path.c_str(), nullptr, error, sizeof error));
-      if (!plain) continue;
-      SCOPED_TRACE(path);
-      try {
-        SceneCfg base;
-        base.base.path = path;
-        expect_round_trip(Scene(std::move(base)));
-        SceneCfg cfg;
-        cfg.entities = {{"a", {.model = {.path = path}}}, {"b", {.model = {.path = path}}}};
-        expect_round_trip(Scene(std::move(cfg)));
-        ++tested;
-      } catch (const std::exception& e) {
-        std::printf("%s: %s\n", path.c_str(), e.what());
-      }
-    }
-  }
-  std::printf("%d models\n", tested);
 }
 
 }  // namespace

@@ -482,7 +482,6 @@ TEST(Simulation, ManualUpdateUsesTheGivenDuration) {
   EXPECT_THAT(filter->substeps, Each(2));
 }
 
-// Rays hit the world in its current state, not in the state of the first cast.
 // A caller that steps its own data and writes the states sees what a step would have shown.
 TEST(Simulation, FollowsStatesThatWereWritten) {
   Simulation stepped(scene(), {.num_worlds = 2}), follower(scene(), {.num_worlds = 2});
@@ -521,6 +520,7 @@ TEST(Simulation, FollowsStatesThatWereWritten) {
   EXPECT_THROW(follower.follow(0), ValueError);
 }
 
+// Rays hit the world in its current state, not in the state of the first cast.
 TEST(Simulation, RaysUseTheCurrentState) {
   scene::SceneCfg cfg;
   cfg.entities.emplace_back("robot", scene::EntityCfg{.model = {.xml = kXml}});

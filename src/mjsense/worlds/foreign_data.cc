@@ -23,40 +23,14 @@ constexpr std::string_view kReset[] = {"qacc", "act_dot", "sensordata", "energy"
 // Fields of constraints that mj_step1 does not compute.
 constexpr std::string_view kSolved[] = {"efc_state", "efc_force"};
 // Fields that kPositions shows.
-constexpr std::string_view kPositions[] = {"xpos",
-                                           "xquat",
-                                           "xmat",
-                                           "xipos",
-                                           "ximat",
-                                           "xanchor",
-                                           "xaxis",
-                                           "geom_xpos",
-                                           "geom_xmat",
-                                           "site_xpos",
-                                           "site_xmat",
-                                           "cam_xpos",
-                                           "cam_xmat",
-                                           "light_xpos",
-                                           "light_xdir",
-                                           "subtree_com",
-                                           "cdof",
-                                           "cinert",
-                                           "flexvert_xpos",
-                                           "flexedge_J",
-                                           "flexedge_length",
-                                           "ten_wrapadr",
-                                           "ten_wrapnum",
-                                           "ten_J",
-                                           "ten_length",
-                                           "wrap_obj",
-                                           "wrap_xpos",
-                                           "actuator_length",
-                                           "moment_rownnz",
-                                           "moment_rowadr",
-                                           "moment_colind",
-                                           "actuator_moment",
-                                           "crb",
-                                           "M"};
+// clang-format off
+constexpr std::string_view kPositions[] = {
+    "xpos", "xquat", "xmat", "xipos", "ximat", "xanchor", "xaxis", "geom_xpos", "geom_xmat",
+    "site_xpos", "site_xmat", "cam_xpos", "cam_xmat", "light_xpos", "light_xdir", "subtree_com",
+    "cdof", "cinert", "flexvert_xpos", "flexedge_J", "flexedge_length", "ten_wrapadr",
+    "ten_wrapnum", "ten_J", "ten_length", "wrap_obj", "wrap_xpos", "actuator_length",
+    "moment_rownnz", "moment_rowadr", "moment_colind", "actuator_moment", "crb", "M"};
+// clang-format on
 constexpr std::string_view kPoses[] = {"geom_xpos", "geom_xmat",  "cam_xpos",
                                        "cam_xmat",  "light_xpos", "light_xdir"};
 

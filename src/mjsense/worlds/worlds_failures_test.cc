@@ -61,8 +61,7 @@ TEST(Worlds, NanControlIsAFailure) {
   Worlds worlds(m.get(), 2, 1);
   Recording hooks(2);
   worlds.reset(all_worlds, 0, hooks);
-  const ArrayView ctrl = worlds.state_component("ctrl");
-  *reinterpret_cast<double*>(ctrl.data) = std::numeric_limits<double>::quiet_NaN();
+  state_row(worlds, "ctrl", 0)[0] = std::numeric_limits<double>::quiet_NaN();
   worlds.step(1, hooks);
   ASSERT_EQ(worlds.failures().size(), 1u);
   EXPECT_EQ(worlds.failures()[0].world, 0);
@@ -75,18 +74,14 @@ TEST(Worlds, OnlyADivergingWorldIsReset) {
   Recording hooks(3);
   worlds.reset(all_worlds, 0, hooks);
   worlds.step(5, hooks);
-  const ArrayView qvel = worlds.state_component("qvel");
-  reinterpret_cast<double*>(qvel.data + qvel.strides[0])[0] =
-      std::numeric_limits<double>::quiet_NaN();
+  state_row(worlds, "qvel", 1)[0] = std::numeric_limits<double>::quiet_NaN();
   worlds.step(5, hooks);
   ASSERT_EQ(worlds.failures().size(), 1u);
   EXPECT_EQ(worlds.failures()[0].world, 1);
   EXPECT_THAT(worlds.failures()[0].message, ::testing::HasSubstr("QVEL"));
   EXPECT_EQ(worlds.substeps(1), 0);
   EXPECT_EQ(worlds.substeps(2), 10);
-  const ArrayView qpos = worlds.state_component("qpos");
-  EXPECT_EQ(reinterpret_cast<double*>(qpos.data + qpos.strides[0])[0],
-            0.5);  // the keyframe of its last reset
+  EXPECT_EQ(state_row(worlds, "qpos", 1)[0], 0.5);  // the keyframe of its last reset
   worlds.step(5, hooks);
   EXPECT_TRUE(worlds.failures().empty());
 }

@@ -120,13 +120,10 @@ TEST(Hold, KeepsABodyInPlaceUntilTheReset) {
     Worlds worlds(m.get(), 2, 1);
     Recording hooks(2);
     const auto box = [&](int world) {
-      const ArrayView qpos = worlds.state_component("qpos"), qvel = worlds.state_component("qvel");
-      const auto row = [&](const ArrayView& view) {
-        return reinterpret_cast<const double*>(reinterpret_cast<const char*>(view.data) +
-                                               world * view.strides[0]);
-      };
-      std::vector<double> state(row(qpos) + 2, row(qpos) + 9);
-      state.insert(state.end(), row(qvel) + 2, row(qvel) + 8);
+      const double *qpos = state_row(worlds, "qpos", world),
+                   *qvel = state_row(worlds, "qvel", world);
+      std::vector<double> state(qpos + 2, qpos + 9);
+      state.insert(state.end(), qvel + 2, qvel + 8);
       return state;
     };
     for (const bool every : {false, true}) {

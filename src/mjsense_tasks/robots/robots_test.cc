@@ -9,52 +9,23 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/mujoco_objects.h"
-#include "mjsense/scene/scene.h"
 #include "mjsense_tasks/robots/load_robot.h"
-#include "mjsense_tasks/robots/robot.h"
+#include "mjsense_tasks/robots/testing/lone_robot.h"
 
 namespace mjsense::tasks::robots {
 namespace {
 
 using testing::HasSubstr;
 
-// One robot without other objects, in one world.
-struct Alone {
+struct Alone : LoneRobot {
   explicit Alone(const std::string& name, const std::optional<ControllerCfg>& of_arms = {})
-      : cfg(robot_cfg(name)) {
+      : LoneRobot(with_controller(robot_cfg(name), of_arms)) {}
+  static RobotCfg with_controller(RobotCfg cfg, const std::optional<ControllerCfg>& of_arms) {
     for (MoveGroupCfg& group : cfg.groups)
       if (of_arms && group.kind == GroupKind::kArm) group.controller = *of_arms;
-    scene::SceneCfg scene_cfg;
-    scene::EntityCfg entity;
-    entity.model = cfg.model;
-    scene_cfg.entities = {{"robot_0", entity}};
-    scene_cfg.options.timestep = 0.001 * cfg.sim_dt_ms;
-    scene = std::make_unique<scene::Scene>(scene_cfg);
-    model = scene->model();
-    robot = std::make_unique<Robot>(cfg, model, 1);
-    data.reset(mj_makeData(model));
-    world = {.id = 0, .model = model, .data = data.get()};
+    return cfg;
   }
-  void start(const Pose& base = {}, std::uint64_t seed = 7) {
-    mj_resetData(model, data.get());
-    Rng rng(seed, 0, 0, 0);
-    robot->write_start(state_row(data.get()), base, rng);
-    mj_forward(model, data.get());
-    robot->reset(world);
-  }
-  // Runs one policy step: command, controls and physics at their periods.
-  void play(const Action& action) {
-    robot->command(world, action);
-    const int controls = cfg.policy_dt_ms / cfg.ctrl_dt_ms,
-              substeps = cfg.ctrl_dt_ms / cfg.sim_dt_ms;
-    robot->write_ctrl(world, state_row(data.get()), nullptr);
-    for (int k = 0; k < controls; ++k) {
-      if (k > 0 && robot->controls_every_step()) robot->control(world, k);
-      for (int i = 0; i < substeps; ++i) mj_step(model, data.get());
-    }
-    mj_forward(model, data.get());
-  }
+  using LoneRobot::play;
   void play(const Action& action, double seconds) {
     for (double t = 0; t < seconds; t += 0.001 * cfg.policy_dt_ms) play(action);
   }
@@ -63,13 +34,6 @@ struct Alone {
       if (robot->groups()[g].kind == kind) return static_cast<int>(g);
     return -1;
   }
-
-  RobotCfg cfg;
-  std::unique_ptr<scene::Scene> scene;
-  const mjModel* model = nullptr;
-  std::unique_ptr<Robot> robot;
-  DataPtr data;
-  World world;
 };
 
 Pose anywhere(Rng& rng) {
@@ -108,19 +72,12 @@ struct EveryRobot : testing::TestWithParam<std::string> {
 };
 
 TEST_P(EveryRobot, TheFirstArmAndGripperAreTheDefault) {
-  Alone alone(GetParam());
-  const auto first = [&](GroupKind kind) {
-    const auto& groups = alone.robot->groups();
-    const auto found = std::ranges::find(groups, kind, &MoveGroup::kind);
-    return found == groups.end() ? -1 : static_cast<int>(found - groups.begin());
-  };
-  EXPECT_EQ(alone.robot->arm(), first(GroupKind::kArm));
-  EXPECT_EQ(alone.robot->gripper(), first(GroupKind::kGripper));
+  EXPECT_EQ(alone.robot->arm(), alone.find(GroupKind::kArm));
+  EXPECT_EQ(alone.robot->gripper(), alone.find(GroupKind::kGripper));
 }
 
 // Each value of a command has a range.
 TEST_P(EveryRobot, CommandsHaveRanges) {
-  Alone alone(GetParam());
   for (const MoveGroup& group : alone.robot->groups()) {
     const auto size = static_cast<std::size_t>(group.command_size);
     EXPECT_EQ(group.command_low.size(), size) << group.name;

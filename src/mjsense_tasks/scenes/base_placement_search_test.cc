@@ -4,33 +4,37 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <memory>
 
-#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/core/testing/temp_dir.h"
-#include "mjsense_tasks/robots/load_robot.h"
+#include "mjsense_tasks/episode/testing/played_task.h"
 #include "mjsense_tasks/scenes/load_scene.h"
 #include "mjsense_tasks/tasks/pick/pick.h"
 
 namespace mjsense::tasks::scenes {
 namespace {
 
-Pose offset_of(const char* robot_name) {
-  EpisodeScene scene(load_scene("table"));
-  episode::TaskCfg cfg;
-  cfg.robot = robots::robot_cfg(robot_name);
-  cfg.scene = "table";
-  tasks::PickTask task(cfg);
-  scene::Scene compiled(task.scene_cfg_with_robot());
-  robots::Robot robot(cfg.robot, compiled.model(), 1);
-  scene.initialize(compiled.model(), 1, "robot_0/");
-  return BasePlacementSearch(compiled.model(), robot, scene).offset();
-}
+// The placement of a robot in a scene.
+struct Placement {
+  Placement(const char* robot_name, const char* scene_name)
+      : scene(load_scene(scene_name)),
+        task(episode::task_cfg(robot_name, scene_name)),
+        compiled(task.scene_cfg_with_robot()),
+        robot(task.cfg().robot, compiled.model(), 1) {
+    scene.initialize(compiled.model(), 1, "robot_0/");
+    offset = BasePlacementSearch(compiled.model(), robot, scene).offset();
+  }
+
+  EpisodeScene scene;
+  tasks::PickTask task;
+  scene::Scene compiled;
+  robots::Robot robot;
+  Pose offset;
+};
 
 // The table scene was made for the Franka.
 TEST(BasePlacementSearch, KeepsThePlacementIfReachable) {
   for (const char* robot : {"franka", "mobile_franka"}) {
-    const Pose offset = offset_of(robot);
+    const Pose offset = Placement(robot, "table").offset;
     EXPECT_EQ(norm(offset.p), 0) << robot;
     EXPECT_EQ(offset.q.w, 1) << robot;
   }
@@ -38,38 +42,24 @@ TEST(BasePlacementSearch, KeepsThePlacementIfReachable) {
 
 // The table tops are 0.6 m high; RB-Y1's hands are at twice that height.
 TEST(BasePlacementSearch, StoopsAtALowTable) {
-  EpisodeScene scene(load_scene("table"));
-  episode::TaskCfg cfg;
-  cfg.robot = robots::robot_cfg("rby1");
-  cfg.scene = "table";
-  tasks::PickTask task(cfg);
-  scene::Scene compiled(task.scene_cfg_with_robot());
-  robots::Robot robot(cfg.robot, compiled.model(), 1);
-  const int torso = robot.group_index("torso");
-  const std::vector<double> upright = robot.cfg().groups[torso].init;
-  scene.initialize(compiled.model(), 1, "robot_0/");
-  const BasePlacementSearch standing(compiled.model(), robot, scene);
-  EXPECT_EQ(robot.cfg().groups[torso].init, cfg.robot.groups[torso].low_init);
-  EXPECT_NE(robot.cfg().groups[torso].init, upright);
-  EXPECT_LE(std::abs(standing.offset().p.x), 0.2);
+  const Placement placement("rby1", "table");
+  const int torso = placement.robot.group_index("torso");
+  const std::vector<double>& init = placement.robot.cfg().groups[torso].init;
+  const robots::MoveGroupCfg& given = placement.task.cfg().robot.groups[torso];
+  EXPECT_EQ(init, given.low_init);
+  EXPECT_NE(init, given.init);
+  EXPECT_LE(std::abs(placement.offset.p.x), 0.2);
 }
 
 // At no base pose that the scene can sample may the robot penetrate the table, which would push it
 // away.
 TEST(BasePlacementSearch, MovedBaseIsCollisionFree) {
-  episode::TaskCfg cfg;
-  cfg.robot = robots::robot_cfg("rby1");
-  cfg.scene = "tableware";
-  tasks::PickTask task(cfg);
-  scene::Scene scene(task.scene_cfg_with_robot());
-  task.initialize(scene.model(), 1);
-  const mjModel* model = scene.model();
-  const DataPtr data = make_data(model);
-  const int root = model->body_rootid[task.robot().base_body()];
+  episode::PlayedTask<tasks::PickTask> played(1, episode::task_cfg("rby1", "tableware"));
+  const mjModel* model = played.model;
+  const mjData* data = played.data.get();
+  const int root = model->body_rootid[played.task.robot().base_body()];
   for (int episode = 0; episode < 16; ++episode) {
-    mj_resetData(model, data.get());
-    task.sample(0, episode, robots::state_row(data.get()));
-    mj_forward(model, data.get());
+    played.start(episode);
     for (int c = 0; c < data->ncon; ++c) {
       const mjContact& contact = data->contact[c];
       const int a = model->body_rootid[model->geom_bodyid[contact.geom[0]]];
@@ -103,41 +93,25 @@ name = "cube"
 model = "cube.xml"
 )";
   for (const auto& [robot, z] : {std::pair{"franka", 0.1}, {"mobile_franka", -0.15}}) {
-    episode::TaskCfg cfg;
-    cfg.robot = robots::robot_cfg(robot);
-    cfg.scene = dir.file("scene.toml");
-    tasks::PickTask task(cfg);
-    scene::Scene scene(task.scene_cfg_with_robot());
-    const mjModel* model = scene.model();
-    task.initialize(model, 1);
-    const DataPtr data = make_data(model);
-    task.sample(0, 0, robots::state_row(data.get()));
-    mj_kinematics(model, data.get());
-    EXPECT_NEAR(task.robot().base_pose({.id = 0, .model = model, .data = data.get()}).p.z, z, 1e-9)
-        << robot;
+    episode::PlayedTask<tasks::PickTask> played(1,
+                                                episode::task_cfg(robot, dir.file("scene.toml")));
+    EXPECT_NEAR(played.task.robot().base_pose(played.start(0)).p.z, z, 1e-9) << robot;
   }
 }
 
 // The YAM is short: the upper board of the shelf is out of its reach, the others are not.
 TEST(BasePlacementSearch, TargetsAreLimitedToRegionsThatAHandReaches) {
   for (const auto& [robot_name, upper] : {std::pair{"franka", true}, {"i2rt_yam", false}}) {
-    EpisodeScene scene(load_scene("shelf"));
-    episode::TaskCfg cfg;
-    cfg.robot = robots::robot_cfg(robot_name);
-    cfg.scene = "shelf";
-    tasks::PickTask task(cfg);
-    const scene::Scene compiled(task.scene_cfg_with_robot());
-    robots::Robot robot(cfg.robot, compiled.model(), 1);
-    scene.initialize(compiled.model(), 1, "robot_0/");
-    const BasePlacementSearch standing(compiled.model(), robot, scene);
-    ASSERT_EQ(scene.regions().size(), 3u);
-    EXPECT_TRUE(scene.regions()[1].for_targets) << robot_name;
-    EXPECT_EQ(scene.regions()[2].for_targets, upper) << robot_name;
+    const Placement placement(robot_name, "shelf");
+    const auto regions = placement.scene.regions();
+    ASSERT_EQ(regions.size(), 3u);
+    EXPECT_TRUE(regions[1].for_targets) << robot_name;
+    EXPECT_EQ(regions[2].for_targets, upper) << robot_name;
   }
 }
 
 TEST(BasePlacementSearch, FloatingHandIsAboveTheTargets) {
-  const Pose offset = offset_of("floating_rum");
+  const Pose offset = Placement("floating_rum", "table").offset;
   EXPECT_NEAR(offset.p.x, 0.54 - 0.15, 1e-9);
   EXPECT_NEAR(offset.p.z, 0.6 + 0.35 + 0.235, 1e-3);
   EXPECT_LT(rotate(offset.q, {0, 0, 1}).z, -0.999);

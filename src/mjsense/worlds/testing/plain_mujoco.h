@@ -103,9 +103,8 @@ inline double* state_row(Worlds& worlds, const char* component, int w) {
 }
 
 inline void drive(Worlds& worlds, int step) {
-  const ArrayView ctrl = worlds.state_component("ctrl");
   for (int w = 0; w < worlds.size(); ++w) {
-    auto* row = reinterpret_cast<double*>(ctrl.data + w * ctrl.strides[0]);
+    double* row = state_row(worlds, "ctrl", w);
     row[0] = std::sin(0.3 * step + w);
     row[1] = 0.2 * w;
   }

@@ -20,7 +20,7 @@ struct DoorPlan : testing::Test, episode::PlayedTask<tasks::DoorOpeningTask> {
     cfg.horizon = 400;
     return cfg;
   }
-  DoorPlan() : PlayedTask(cfg()) {}
+  DoorPlan() : PlayedTask(1, cfg()) {}
 };
 
 // DoorGeometry::carried() agrees with MuJoCo's kinematics of the door joints.

@@ -20,7 +20,7 @@ episode::TaskCfg of(const char* robot) {
 }
 
 struct Driven : episode::PlayedTask<tasks::NavToObjTask> {
-  explicit Driven(const char* robot) : PlayedTask(of(robot)) { task.register_policy(planner); }
+  explicit Driven(const char* robot) : PlayedTask(1, of(robot)) { task.register_policy(planner); }
   NavPlanner planner;
 };
 

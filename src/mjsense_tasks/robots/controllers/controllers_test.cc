@@ -7,10 +7,8 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/core/testing/error_of.h"
-#include "mjsense/scene/scene.h"
-#include "mjsense_tasks/robots/robot.h"
+#include "mjsense_tasks/robots/testing/lone_robot.h"
 
 namespace mjsense::tasks::robots {
 namespace {
@@ -18,8 +16,13 @@ namespace {
 using testing::HasSubstr;
 
 // A robot with one move group "g"; policy, control and physics periods of 60, 6 and 2 ms.
-struct OneGroup {
-  OneGroup(const std::string& xml, MoveGroupCfg group, const char* base = "base") {
+struct OneGroup : LoneRobot {
+  OneGroup(const std::string& xml, MoveGroupCfg group, const char* base = "base")
+      : LoneRobot(of_group(xml, std::move(group), base)) {
+    start();
+  }
+  static RobotCfg of_group(const std::string& xml, MoveGroupCfg group, const char* base) {
+    RobotCfg cfg;
     cfg.name = "small";
     cfg.model.xml = xml;
     cfg.base_body = base;
@@ -27,45 +30,14 @@ struct OneGroup {
     cfg.groups = {std::move(group)};
     cfg.policy_dt_ms = 60;
     cfg.ctrl_dt_ms = 6;
-    scene::SceneCfg scene_cfg;
-    scene::EntityCfg entity;
-    entity.model = cfg.model;
-    scene_cfg.entities = {{"robot_0", entity}};
-    scene = std::make_unique<scene::Scene>(scene_cfg);
-    model = scene->model();
-    robot = std::make_unique<Robot>(cfg, model, 1);
-    data.reset(mj_makeData(model));
-    world = {.id = 0, .model = model, .data = data.get()};
-    start({});
-  }
-  void start(const Pose& base) {
-    mj_resetData(model, data.get());
-    Rng rng(1, 0, 0, 0);
-    robot->write_start(state_row(data.get()), base, rng);
-    mj_forward(model, data.get());
-    robot->reset(world);
+    return cfg;
   }
   void play(std::vector<double> command, int steps = 1) {
     Action action;
     if (!command.empty()) action.commands[0].set(command);
-    for (int s = 0; s < steps; ++s) {
-      robot->command(world, action);
-      robot->write_ctrl(world, state_row(data.get()), nullptr);
-      for (int k = 0; k < 10; ++k) {
-        if (k > 0 && robot->controls_every_step()) robot->control(world, k);
-        for (int i = 0; i < 3; ++i) mj_step(model, data.get());
-      }
-      mj_forward(model, data.get());
-    }
+    for (int s = 0; s < steps; ++s) LoneRobot::play(action);
   }
   double target(int i) const { return robot->targets(0)[0].values[i]; }
-
-  RobotCfg cfg;
-  std::unique_ptr<scene::Scene> scene;
-  const mjModel* model = nullptr;
-  std::unique_ptr<Robot> robot;
-  DataPtr data;
-  World world;
 };
 
 std::string two_joints(const char* actuator) {

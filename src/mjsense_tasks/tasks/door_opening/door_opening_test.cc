@@ -22,7 +22,7 @@ using testing::HasSubstr;
 
 struct Played : episode::PlayedTask<DoorOpeningTask> {
   explicit Played(const std::string& scene = "room_with_door")
-      : PlayedTask(episode::task_cfg("rby1", scene), 2) {}
+      : PlayedTask(2, episode::task_cfg("rby1", scene)) {}
   double& position() { return data->qpos[model->jnt_qposadr[task.door(0).joint]]; }
   // Applies torques (N m) to the hinge (positive opens) and the lever (positive presses down) for
   // `seconds`.

@@ -6,9 +6,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/scene/resolve.h"
-#include "mjsense_tasks/robots/load_robot.h"
+#include "mjsense_tasks/episode/testing/played_task.h"
 #include "mjsense_tasks/tasks/opening/opening.h"
 
 namespace mjsense::tasks {
@@ -120,16 +119,10 @@ TEST(Drive, BaseAndArmKeepTheGripperOnTheHandle) {
 
 TEST(Opening, OpenedFractionDependsOnTheRobot) {
   for (const auto& [name, opened] : {std::pair{"franka", 0.15}, {"rby1", 0.67}}) {
-    episode::TaskCfg cfg;
-    cfg.robot = robots::robot_cfg(name);
-    OpeningTask task(cfg, OpeningKind::kOpen);
-    const scene::Scene scene(task.scene_cfg_with_robot());
-    task.initialize(scene.model(), 1);
-    const DataPtr data = make_data(scene.model());
-    task.sample(0, 0, robots::state_row(data.get()));
-    mj_forward(scene.model(), data.get());
-    const World world{.id = 0, .model = scene.model(), .data = data.get()};
-    task.begin(world);
+    episode::PlayedTask<OpeningTask> played(1, episode::task_cfg(name), OpeningKind::kOpen);
+    const World world = played.start(0);
+    const OpeningTask& task = played.task;
+    mjData* data = world.data;
     EXPECT_EQ(task.opened(), opened);
     const Articulation& one = task.target(0);
     EXPECT_GT(one.fraction(task.aim(one)), opened + 0.05);
@@ -139,7 +132,7 @@ TEST(Opening, OpenedFractionDependsOnTheRobot) {
     EXPECT_TRUE(task.evaluate(world).success) << name;
     // The success threshold corresponds to the pose in obj_end.
     data->qpos[one.qpos] = one.at(opened);
-    mj_kinematics(scene.model(), data.get());
+    mj_kinematics(world.model, data);
     const Pose goal = *task.goal_pose(0, "pickup_obj");
     EXPECT_NEAR(norm(goal.p - vec3(data->xpos + 3 * one.body)), 0, 1e-9);
   }

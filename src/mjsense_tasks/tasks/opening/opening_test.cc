@@ -6,9 +6,7 @@
 
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <regex>
 #include <set>
@@ -16,10 +14,9 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/model_geometry.h"
 #include "mjsense/core/testing/error_of.h"
-#include "mjsense/core/testing/temp_dir.h"
 #include "mjsense/core/testing/test_model.h"
 #include "mjsense/scene/resolve.h"
-#include "mjsense_tasks/robots/load_robot.h"
+#include "mjsense_tasks/episode/testing/played_task.h"
 
 namespace mjsense::tasks {
 namespace {
@@ -28,39 +25,12 @@ using std::numbers::pi;
 using ::testing::HasSubstr;
 
 episode::TaskCfg franka(const std::string& scene = "") {
-  episode::TaskCfg cfg;
-  cfg.robot = robots::robot_cfg("franka");
-  cfg.scene = scene;
-  return cfg;
+  return episode::task_cfg("franka", scene);
 }
 
-struct Stage {
+struct Stage : episode::PlayedTask<OpeningTask> {
   Stage(episode::TaskCfg cfg, OpeningKind kind, int worlds = 3)
-      : task(std::move(cfg), kind), scene(task.scene_cfg_with_robot()), model(scene.model()) {
-    task.initialize(model, worlds);
-    data.reset(mj_makeData(model));
-  }
-  World start(int world, std::int64_t episode) {
-    mj_resetData(model, data.get());
-    task.sample(world, episode, robots::state_row(data.get()));
-    mj_forward(model, data.get());
-    const World w{.id = world, .model = model, .data = data.get()};
-    task.begin(w);
-    return w;
-  }
-  nlohmann::json info(const World& w) {
-    std::vector<std::uint8_t> row(500);
-    JsonWriter json(row);
-    json.begin_object();
-    task.write_info(w, json);
-    json.end_object();
-    EXPECT_TRUE(json.finish());
-    return nlohmann::json::parse(reinterpret_cast<const char*>(row.data()));
-  }
-  OpeningTask task;
-  scene::Scene scene;
-  const mjModel* model;
-  DataPtr data;
+      : PlayedTask(worlds, std::move(cfg), kind) {}
 };
 
 ModelPtr compiled(const std::string& bodies) {
@@ -176,15 +146,15 @@ TEST(Opening, KitchensHaveAllCategories) {
 
 TEST(Opening, EpisodeDependsOnItsNumberOnly) {
   Stage stage(franka(), OpeningKind::kClose), other(franka(), OpeningKind::kClose, 1);
-  stage.start(0, 5);
-  std::vector<double> qpos(stage.data->qpos, stage.data->qpos + stage.model->nq);
+  stage.start(5);
+  const std::vector<double> qpos = stage.qpos();
   const std::string what = stage.task.description(0);
-  stage.start(2, 6);
-  EXPECT_NE(qpos, std::vector<double>(stage.data->qpos, stage.data->qpos + stage.model->nq));
-  stage.start(2, 5);
-  EXPECT_EQ(qpos, std::vector<double>(stage.data->qpos, stage.data->qpos + stage.model->nq));
-  other.start(0, 5);  // the first search of this stage: nothing is cached
-  EXPECT_EQ(qpos, std::vector<double>(other.data->qpos, other.data->qpos + other.model->nq));
+  stage.start(6, 2);
+  EXPECT_NE(qpos, stage.qpos());
+  stage.start(5, 2);
+  EXPECT_EQ(qpos, stage.qpos());
+  other.start(5);  // the first search of this stage: nothing is cached
+  EXPECT_EQ(qpos, other.qpos());
   EXPECT_EQ(what, stage.task.description(2));
 }
 
@@ -193,7 +163,7 @@ TEST(Opening, StartsAreFeasibleAndDiffer) {
   std::set<std::string> texts;
   std::set<double> places;
   for (int episode = 0; episode < 20; ++episode) {
-    const World w = stage.start(0, episode);
+    const World w = stage.start(episode);
     EXPECT_EQ(stage.task.start_error(w), "");
     for (int i = 0; i < stage.data->ncon; ++i)
       EXPECT_GT(stage.data->contact[i].dist, -0.002) << episode;
@@ -211,7 +181,7 @@ TEST(Opening, StartsAreFeasibleAndDiffer) {
 // of the range.
 TEST(Opening, OpenCountsEveryArticulationOfTheCategory) {
   Stage stage(franka(), OpeningKind::kOpen);
-  const World w = stage.start(1, 3);
+  const World w = stage.start(3, 1);
   const Articulation& target = stage.task.target(1);
   for (const Articulation& one : stage.task.articulations()) {
     stage.data->qpos[one.qpos] = one.at(0.149);
@@ -220,7 +190,7 @@ TEST(Opening, OpenCountsEveryArticulationOfTheCategory) {
     EXPECT_EQ(stage.task.evaluate(w).missing, "it is not open far enough");
     stage.data->qpos[one.qpos] = one.at(0.1501);
     EXPECT_EQ(stage.task.evaluate(w).success, counts) << one.name;
-    EXPECT_EQ(stage.info(w)["success"], counts);
+    EXPECT_EQ(stage.info()["success"], counts);
     stage.data->qpos[one.qpos] = one.closed;
   }
   stage.data->qpos[target.qpos] = -0.02 * target.range();  // beyond its end: |q|
@@ -230,7 +200,7 @@ TEST(Opening, OpenCountsEveryArticulationOfTheCategory) {
 TEST(Opening, CloseCountsOnlyTheTarget) {
   Stage stage(franka(), OpeningKind::kClose);
   for (int episode = 0; episode < 4; ++episode) {
-    const World w = stage.start(1, episode);
+    const World w = stage.start(episode, 1);
     const Articulation& target = stage.task.target(1);
     const episode::Evaluation e = stage.task.evaluate(w);
     EXPECT_GE(e.reward, 0.35);
@@ -253,13 +223,13 @@ TEST(Opening, CloseCountsOnlyTheTarget) {
     EXPECT_NEAR(angle_between(goal.q, quat(stage.data->xquat + 4 * target.body)), 0, 1e-7);
     const auto first =
         std::ranges::find(stage.task.articulations(), target.category, &Articulation::category);
-    EXPECT_EQ(stage.info(w)["joint_position"], stage.data->qpos[first->qpos]);
+    EXPECT_EQ(stage.info()["joint_position"], stage.data->qpos[first->qpos]);
   }
 }
 
 TEST(Opening, RobotDoesNotStartInsideFurniture) {
   Stage stage(franka(), OpeningKind::kOpen);
-  const World w = stage.start(0, 0);
+  const World w = stage.start(0);
   const auto start = stage.task.reach().start_of(w);
   const BaseSearch search(stage.task.robot(), stage.task.reach(), start,
                           stage.task.robot().base_pose(w));
@@ -286,7 +256,7 @@ TEST(Opening, GripperStaysOnTheHandleAlongThePath) {
   Rng rng(1, 0, 0, 0);
   int found = 0, again = 0;
   for (int episode = 0; episode < 50; ++episode) {
-    const World w = stage.start(0, episode);
+    const World w = stage.start(episode);
     const Articulation& one = stage.task.target(0);
     const double from = stage.data->qpos[one.qpos], to = stage.task.aim(one);
     HandleReach::Start start = reach.start_of(w);
@@ -317,15 +287,13 @@ TEST(Opening, GripperStaysOnTheHandleAlongThePath) {
 // The tool of a floating gripper moves with the handle about the door's hinge. At the start, it
 // floats in front of the handle without touching anything.
 TEST(Opening, FloatingGripperMovesOnAScrew) {
-  episode::TaskCfg cfg;
-  cfg.robot = robots::robot_cfg("floating_rum");
-  Stage stage(cfg, OpeningKind::kOpen, 1);
+  Stage stage(episode::task_cfg("floating_rum"), OpeningKind::kOpen, 1);
   const HandleReach& reach = stage.task.reach();
   ASSERT_EQ(reach.hands().size(), 1u);
   EXPECT_TRUE(reach.hands()[0].floats());
   EXPECT_FALSE(reach.drives());
   for (int episode = 0; episode < 6; ++episode) {
-    const World w = stage.start(0, episode);
+    const World w = stage.start(episode);
     ASSERT_EQ(stage.task.start_error(w), "");
     const Articulation& one = stage.task.target(0);
     const double from = w.data->qpos[one.qpos], to = stage.task.aim(one);
@@ -351,7 +319,7 @@ TEST(Opening, FloatingGripperMovesOnAScrew) {
 // An obstacle 5 mm from the arm blocks the path. Its pose is taken from the world's own model.
 TEST(Opening, CollisionChecksUseTheModelOfTheWorld) {
   Stage stage(franka(), OpeningKind::kOpen);
-  const World w = stage.start(0, 0);
+  const World w = stage.start(0);
   const mjModel* m = stage.model;
   mjData* d = w.data;
   const HandleReach& reach = stage.task.reach();
@@ -423,7 +391,7 @@ TEST(Opening, InstructionsDescribeTheTarget) {
     Stage stage(franka(), kind, 1);
     std::set<std::string> sentences;
     for (int episode = 0; episode < 40; ++episode) {
-      const World w = stage.start(0, episode);
+      const World w = stage.start(episode);
       const std::string sentence = stage.task.instruction(0);
       sentences.insert(sentence);
       std::smatch found;

@@ -10,56 +10,37 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/scene/resolve.h"
-#include "mjsense_tasks/robots/load_robot.h"
+#include "mjsense_tasks/episode/testing/played_task.h"
 
 namespace mjsense::tasks {
 namespace {
 
 using testing::HasSubstr;
 
-episode::TaskCfg franka() {
-  episode::TaskCfg cfg;
-  cfg.robot = robots::robot_cfg("franka");
-  cfg.scene = "table";
-  return cfg;
-}
+episode::TaskCfg franka() { return episode::task_cfg("franka", "table"); }
 
-struct Pick : testing::Test {
-  void start(int world, std::int64_t episode) {
-    mj_resetData(model, data.get());
-    task.sample(world, episode, robots::state_row(data.get()));
-    mj_forward(model, data.get());
-    w = {.id = world, .model = model, .data = data.get()};
-    task.begin(w);
-  }
-  int body() const { return task.objects(w.id)[0].body; }
-  double* object_qpos() { return data->qpos + model->jnt_qposadr[model->body_jntadr[body()]]; }
-
-  PickTask task{franka()};
-  scene::Scene scene{task.scene_cfg_with_robot()};
-  const mjModel* model = scene.model();
-  DataPtr data = make_data(model);
-  World w;
-  void SetUp() override { task.initialize(model, 3); }
+struct Pick : testing::Test, episode::PlayedTask<PickTask> {
+  Pick() : PlayedTask(3, franka()) {}
+  int body() const { return task.objects(world.id)[0].body; }
+  double* object_qpos() { return qpos_of(body()); }
 };
 
 TEST_F(Pick, EpisodeDependsOnItsNumberOnly) {
-  start(0, 5);
-  const std::vector<double> qpos(data->qpos, data->qpos + model->nq);
+  start(5);
+  const std::vector<double> before = qpos();
   const std::string what = task.description(0);
-  start(2, 6);
-  EXPECT_NE(qpos, std::vector<double>(data->qpos, data->qpos + model->nq));
-  start(2, 5);
-  EXPECT_EQ(qpos, std::vector<double>(data->qpos, data->qpos + model->nq));
+  start(6, 2);
+  EXPECT_NE(before, qpos());
+  start(5, 2);
+  EXPECT_EQ(before, qpos());
   EXPECT_EQ(what, task.description(2));
 }
 
 TEST_F(Pick, ObjectsStartOnTheTableWithoutCollision) {
   std::set<std::string> targets;
   for (int episode = 0; episode < 100; ++episode) {
-    start(0, episode);
+    start(episode);
     targets.insert(task.description(0));
     for (int i = 0; i < data->ncon; ++i) EXPECT_GT(data->contact[i].dist, -1e-4) << episode;
     const auto objects = task.all_objects();
@@ -86,7 +67,7 @@ TEST_F(Pick, ObjectsStartOnTheTableWithoutCollision) {
 
 TEST_F(Pick, ObjectsStayWhereTheyStart) {
   for (int episode = 0; episode < 3; ++episode) {
-    start(0, episode);
+    start(episode);
     const std::vector<double> before(data->xpos, data->xpos + 3 * model->nbody);
     for (int i = 0; i < 500; ++i) mj_step(model, data.get());
     for (const auto& object : task.all_objects()) {
@@ -98,21 +79,21 @@ TEST_F(Pick, ObjectsStayWhereTheyStart) {
 }
 
 TEST_F(Pick, LiftWithoutTheRobotIsNotSuccess) {
-  start(0, 1);
-  episode::Evaluation e = task.evaluate(w);
+  start(1);
+  episode::Evaluation e = task.evaluate(world);
   EXPECT_EQ(e.reward, 0);
   EXPECT_FALSE(e.success || e.terminal || e.truncated);
   object_qpos()[2] += 0.05;
   mj_forward(model, data.get());
-  e = task.evaluate(w);
+  e = task.evaluate(world);
   EXPECT_NEAR(e.reward, 0.05, 1e-9);  // no other body supports it
   EXPECT_FALSE(e.success);            // but the robot does not touch it
 }
 
 TEST_F(Pick, LyingOnAnotherObjectIsNotSuccess) {
-  start(0, 0);
+  start(0);
   for (int episode = 1; task.all_objects()[task.target(0)].kind != "blue_cube"; ++episode)
-    start(0, episode);
+    start(episode);
   // On top of another object: high enough, but not held by the robot.
   const int target = task.target(0);
   const auto& other = task.all_objects()[0];
@@ -124,14 +105,14 @@ TEST_F(Pick, LyingOnAnotherObjectIsNotSuccess) {
   write_vec({at[0], at[1], top - 0.0005 - task.all_objects()[target].shape.low}, object_qpos());
   write_quat({}, object_qpos() + 3);
   mj_forward(model, data.get());
-  const episode::Evaluation e = task.evaluate(w);
+  const episode::Evaluation e = task.evaluate(world);
   EXPECT_FALSE(e.success);
   EXPECT_EQ(e.reward, 0) << "the other object bears it";
 }
 
 // An object counts as lifted only if the robot touches it and nothing else does.
 TEST_F(Pick, SuccessRequiresContactWithTheRobotOnly) {
-  start(0, 1);
+  start(1);
   const int target = task.target(0);
   // Move the object onto a colliding part of the gripper.
   const int gripper = scene::resolve(model, mjOBJ_BODY, "robot_0/gripper/base", "test");
@@ -139,12 +120,12 @@ TEST_F(Pick, SuccessRequiresContactWithTheRobotOnly) {
   write_vec({g[0], g[1], g[2]}, object_qpos());
   mj_forward(model, data.get());
   ASSERT_GT(data->ncon, 0);
-  EXPECT_TRUE(task.evaluate(w).success);
-  EXPECT_FALSE(task.evaluate(w).terminal) << "success ends an episode only if asked";
+  EXPECT_TRUE(task.evaluate(world).success);
+  EXPECT_FALSE(task.evaluate(world).terminal) << "success ends an episode only if asked";
 
   // Another object touches it: no success, although the robot still touches it.
   const auto& other = task.all_objects()[target == 0 ? 1 : 0];
-  double* q = data->qpos + model->jnt_qposadr[model->body_jntadr[other.body]];
+  double* q = qpos_of(other.body);
   const Vec3 before = vec3(q);
   const Vec3 far = task.all_objects()[target].shape.points.front();
   write_vec(Vec3{g[0], g[1], g[2]} + 1.2 * far, q);
@@ -156,27 +137,27 @@ TEST_F(Pick, SuccessRequiresContactWithTheRobotOnly) {
     touching |= (a == other.body && b == body()) || (b == other.body && a == body());
   }
   ASSERT_TRUE(touching);
-  EXPECT_FALSE(task.evaluate(w).success);
-  EXPECT_EQ(task.evaluate(w).missing, "something other than the robot touches the object");
+  EXPECT_FALSE(task.evaluate(world).success);
+  EXPECT_EQ(task.evaluate(world).missing, "something other than the robot touches the object");
   write_vec(before, q);
   mj_forward(model, data.get());
-  EXPECT_TRUE(task.evaluate(w).success);
+  EXPECT_TRUE(task.evaluate(world).success);
 }
 
 // Success begins at a lift of one centimeter.
 TEST_F(Pick, SuccessStartsAtALiftOfOneCentimetre) {
-  start(0, 1);
+  start(1);
   const int gripper = scene::resolve(model, mjOBJ_BODY, "robot_0/gripper/base", "test");
   write_vec(vec3(data->xpos + 3 * gripper), object_qpos());
   mj_forward(model, data.get());
-  task.begin(w);  // the episode starts here
+  task.begin(world);  // the episode starts here
   const double z = object_qpos()[2];
   for (const auto& [up, success] :
        {std::pair{0.0, false}, {0.0095, false}, {0.0105, true}, {-0.02, false}}) {
     object_qpos()[2] = z + up;
     mj_forward(model, data.get());
-    EXPECT_EQ(task.evaluate(w).success, success) << up;
-    EXPECT_EQ(task.evaluate(w).missing, success ? "" : "the object is not lifted");
+    EXPECT_EQ(task.evaluate(world).success, success) << up;
+    EXPECT_EQ(task.evaluate(world).missing, success ? "" : "the object is not lifted");
   }
 }
 
@@ -186,7 +167,7 @@ TEST_F(Pick, TargetHasFreeSpaceAroundIt) {
   int tight = 0;
   constexpr int kEpisodes = 200;
   for (int episode = 0; episode < kEpisodes; ++episode) {
-    start(0, episode);
+    start(episode);
     const auto objects = task.all_objects();
     const int target = task.target(0);
     const double* t = data->xpos + 3 * objects[target].body;
@@ -224,7 +205,7 @@ TEST_F(Pick, TargetHasFreeSpaceAroundIt) {
 TEST_F(Pick, BlocksRestOnEveryKindOfFace) {
   int paths[3] = {};
   for (int episode = 0; episode < 150; ++episode) {
-    start(0, episode);
+    start(episode);
     for (const auto& object : task.all_objects()) {
       if (object.kind != "red_block") continue;
       const Quat q = quat(data->xquat + 4 * object.body);
@@ -236,39 +217,39 @@ TEST_F(Pick, BlocksRestOnEveryKindOfFace) {
 }
 
 TEST_F(Pick, EndsAtTheHorizonOrWithADoneAction) {
-  start(0, 0);
+  start(0);
   robots::Action action;
   for (int i = 0; i < task.cfg().horizon - 1; ++i)
-    task.apply(w, action, robots::state_row(data.get()));
-  EXPECT_FALSE(task.evaluate(w).truncated);
-  task.apply(w, action, robots::state_row(data.get()));
-  EXPECT_TRUE(task.evaluate(w).truncated);
-  EXPECT_FALSE(task.evaluate(w).terminal);
+    task.apply(world, action, robots::state_row(data.get()));
+  EXPECT_FALSE(task.evaluate(world).truncated);
+  task.apply(world, action, robots::state_row(data.get()));
+  EXPECT_TRUE(task.evaluate(world).truncated);
+  EXPECT_FALSE(task.evaluate(world).terminal);
   action.done = true;
-  task.apply(w, action, robots::state_row(data.get()));
-  EXPECT_TRUE(task.evaluate(w).terminal);
-  start(0, 1);
-  EXPECT_FALSE(task.evaluate(w).terminal) << "a new episode";
+  task.apply(world, action, robots::state_row(data.get()));
+  EXPECT_TRUE(task.evaluate(world).terminal);
+  start(1);
+  EXPECT_FALSE(task.evaluate(world).terminal) << "a new episode";
   EXPECT_EQ(task.last_action(0), nullptr);
 }
 
 // Action noise differs between episodes and between steps, but not between worlds: the same state
 // and command in another world gives the same noise.
 TEST_F(Pick, ActionNoiseDependsOnEpisodeAndStep) {
-  start(0, 5);
-  const std::vector<double> qpos(data->qpos, data->qpos + model->nq);
+  start(5);
+  const std::vector<double> before = qpos();
   const int arm = task.robot().arm();
   robots::RobotValues now;
-  task.robot().read_qpos(w, now);
+  task.robot().read_qpos(world, now);
   std::vector<double> target(now[arm].view().begin(), now[arm].view().end());
   for (double& q : target) q += 0.05;
-  const auto noisy = [&](int world, std::int64_t episode, int step) {
-    start(world, episode);
-    std::copy(qpos.begin(), qpos.end(), data->qpos);
+  const auto noisy = [&](int id, std::int64_t episode, int step) {
+    start(episode, id);
+    std::ranges::copy(before, data->qpos);
     mj_forward(model, data.get());
     robots::Action action;
     action.commands[arm].set(target);
-    for (int i = 0; i <= step; ++i) task.apply(w, action, robots::state_row(data.get()));
+    for (int i = 0; i <= step; ++i) task.apply(world, action, robots::state_row(data.get()));
     return std::vector<double>(data->ctrl, data->ctrl + model->nu);
   };
   const std::vector<double> ctrl = noisy(0, 5, 0);
@@ -278,7 +259,7 @@ TEST_F(Pick, ActionNoiseDependsOnEpisodeAndStep) {
 }
 
 TEST_F(Pick, ObsSceneDescribesTheTask) {
-  start(1, 3);
+  start(3, 1);
   const auto obs = nlohmann::json::parse(task.obs_scene(1));
   EXPECT_EQ(obs["task_type"], "pick");
   EXPECT_EQ(obs["policy_dt_ms"], 66);
@@ -289,13 +270,7 @@ TEST_F(Pick, ObsSceneDescribesTheTask) {
     probability += pair[1].get<double>();
   EXPECT_NEAR(probability, 1, 1e-12);
 
-  std::vector<std::uint8_t> row(400);
-  JsonWriter json(row);
-  json.begin_object();
-  task.write_info(w, json);
-  json.end_object();
-  ASSERT_TRUE(json.finish());
-  const auto info = nlohmann::json::parse(reinterpret_cast<const char*>(row.data()));
+  const auto info = this->info();
   EXPECT_NEAR(info["position_error"].get<double>(), 0.05, 1e-9);
   EXPECT_NEAR(info["rotation_error"].get<double>(), 0, 1e-6);
   EXPECT_EQ(info["success"], false);
@@ -303,7 +278,7 @@ TEST_F(Pick, ObsSceneDescribesTheTask) {
 }
 
 TEST_F(Pick, GoalIsFiveCentimetresAboveTheStart) {
-  start(0, 2);
+  start(2);
   const Pose start_pose = task.start_pose(0, "pickup_obj");
   EXPECT_NEAR(start_pose.p.z, data->xpos[3 * body() + 2], 1e-12);
   EXPECT_NEAR(task.goal_pose(0, "pickup_obj")->p.z - start_pose.p.z, 0.05, 1e-12);

@@ -8,10 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "mjsense/core/error.h"
-#include "mjsense/core/mujoco_objects.h"
 #include "mjsense/core/testing/error_of.h"
 #include "mjsense/scene/resolve.h"
-#include "mjsense_tasks/robots/load_robot.h"
+#include "mjsense_tasks/episode/testing/played_task.h"
 #include "mjsense_tasks/tasks/pick_and_place/support_check.h"
 
 namespace mjsense::tasks {
@@ -21,44 +20,25 @@ using testing::HasSubstr;
 using testing::StartsWith;
 
 // A task whose objects a test can move.
-struct Table {
-  explicit Table(PlaceKind kind, const char* scene_name = "") : task(kind, cfg(scene_name)) {
-    scene = std::make_unique<scene::Scene>(task.scene_cfg_with_robot());
-    task.initialize(scene->model(), 3);
-    data.reset(mj_makeData(scene->model()));
-  }
-  static episode::TaskCfg cfg(const char* scene_name) {
-    episode::TaskCfg cfg;
-    cfg.robot = robots::robot_cfg("franka");
-    cfg.scene = scene_name;
-    return cfg;
-  }
-  void start(int id, std::int64_t episode) {
-    mj_resetData(scene->model(), data.get());
-    task.sample(id, episode, robots::state_row(data.get()));
-    mj_forward(scene->model(), data.get());
-    world = {.id = id, .model = scene->model(), .data = data.get()};
-    task.begin(world);
-  }
+struct Table : episode::PlayedTask<PickAndPlaceTask> {
+  explicit Table(PlaceKind kind, const char* scene_name = "")
+      : PlayedTask(3, kind, episode::task_cfg("franka", scene_name)) {}
   // Starts the first episode whose receptacle is of this kind.
   void start_with(const std::string& kind) {
     for (int episode = 0; episode < 200; ++episode) {
-      start(0, episode);
+      start(episode);
       if (task.objects(0)[1].name == kind) return;
     }
     FAIL() << "no episode with a " << kind;
   }
   int body(int k) const { return task.objects(world.id)[k].body; }
-  double* qpos(int k) {
-    return data->qpos + world.model->jnt_qposadr[world.model->body_jntadr[body(k)]];
-  }
-  Pose pose(int k) { return {vec3(qpos(k)), quat(qpos(k) + 3)}; }
+  Pose pose(int k) { return {vec3(qpos_of(body(k))), quat(qpos_of(body(k)) + 3)}; }
   void put(int k, const Pose& pose) {
-    write_vec(pose.p, qpos(k));
-    write_quat(pose.q, qpos(k) + 3);
-    double* v = data->qvel + world.model->jnt_dofadr[world.model->body_jntadr[body(k)]];
+    write_vec(pose.p, qpos_of(body(k)));
+    write_quat(pose.q, qpos_of(body(k)) + 3);
+    double* v = data->qvel + model->jnt_dofadr[model->body_jntadr[body(k)]];
     std::fill(v, v + 6, 0.0);
-    mj_forward(world.model, data.get());
+    mj_forward(model, data.get());
   }
   // Drops the object above the middle of the receptacle and waits until both are at rest.
   void drop() {
@@ -70,43 +50,31 @@ struct Table {
     settle(1000);
   }
   void settle(int steps) {
-    for (int i = 0; i < steps; ++i) mj_step(world.model, data.get());
-    mj_forward(world.model, data.get());
+    for (int i = 0; i < steps; ++i) mj_step(model, data.get());
+    mj_forward(model, data.get());
   }
   // Evaluates the state as a new observation.
   episode::Evaluation look() {
     task.apply(world, robots::Action{}, robots::state_row(data.get()));
     return task.evaluate(world);
   }
-  nlohmann::json info() {
-    std::vector<std::uint8_t> text(4000);
-    JsonWriter json(text);
-    json.finite_only().begin_object();  // before the first support, differences are infinite
-    task.write_info(world, json);
-    json.end_object();
-    return nlohmann::json::parse(std::string(text.begin(), std::ranges::find(text, 0)));
-  }
-  PickAndPlaceTask task;
-  std::unique_ptr<scene::Scene> scene;
-  DataPtr data;
-  World world;
 };
 
 TEST(PickAndPlace, EpisodeDependsOnItsNumberOnly) {
   Table table(PlaceKind::kInOrOn);
-  table.start(0, 5);
-  const std::vector<double> qpos(table.data->qpos, table.data->qpos + table.world.model->nq);
+  table.start(5);
+  const std::vector<double> qpos = table.qpos();
   const std::string scene = table.task.obs_scene(0);
-  table.start(2, 6);
-  table.start(2, 5);
-  EXPECT_EQ(qpos, std::vector<double>(table.data->qpos, table.data->qpos + table.world.model->nq));
+  table.start(6, 2);
+  table.start(5, 2);
+  EXPECT_EQ(qpos, table.qpos());
   EXPECT_EQ(scene, table.task.obs_scene(2));
 }
 
 TEST(PickAndPlace, StartsAreReachableAndWithoutCollision) {
   Table table(PlaceKind::kInOrOn);
   for (int episode = 0; episode < 30; ++episode) {
-    table.start(0, episode);
+    table.start(episode);
     EXPECT_EQ(table.task.start_error(table.world), "") << episode;
     for (int k = 0; k < 2; ++k) {
       EXPECT_GT(table.pose(k).p.x, 0.41);
@@ -176,8 +144,8 @@ TEST(PickAndPlace, SupportIsKeptWithinFiveMillimetres) {
 
 TEST(PickAndPlace, RobotMustReleaseTheObject) {
   Table table(PlaceKind::kInOrOn);
-  table.start(0, 0);
-  const int gripper = scene::resolve(table.world.model, mjOBJ_BODY, "robot_0/gripper/base", "test");
+  table.start(0);
+  const int gripper = scene::resolve(table.model, mjOBJ_BODY, "robot_0/gripper/base", "test");
   table.put(0, {vec3(table.data->xpos + 3 * gripper), {}});
   table.look();
   EXPECT_TRUE(table.info()["robot_contact"].get<bool>());
@@ -185,7 +153,7 @@ TEST(PickAndPlace, RobotMustReleaseTheObject) {
 
 TEST(PickAndPlace, NextToRequiresTheSameSupport) {
   Table table(PlaceKind::kNextTo);
-  table.start(0, 1);
+  table.start(1);
   EXPECT_THAT(table.task.description(0), HasSubstr("next to the"));
   const Pose start = table.pose(0), other = table.pose(1);
   // Offset along y, away from the robot and other objects.
@@ -212,11 +180,11 @@ TEST(PickAndPlace, NextToRequiresTheSameSupport) {
 // The robot's pedestal begins at the table's edge, 2 cm below the table top.
 TEST(PickAndPlace, NextToPlacesAreOnTheTable) {
   Table table(PlaceKind::kNextTo);
-  table.start(0, 1);
-  const int top = scene::resolve(table.world.model, mjOBJ_GEOM, "room/table_top", "test");
+  table.start(1);
+  const int top = scene::resolve(table.model, mjOBJ_GEOM, "room/table_top", "test");
   const auto places = [&](double from_edge) {
     const double* at = table.data->geom_xpos + 3 * top;
-    const double edge = at[0] - table.world.model->geom_size[3 * top];
+    const double edge = at[0] - table.model->geom_size[3 * top];
     const Aabb other = world_box(table.world, table.body(1));
     table.put(1, {table.pose(1).p + Vec3{edge + from_edge - other.low.x, -other.center().y, 0},
                   table.pose(1).q});
@@ -241,7 +209,7 @@ TEST(PickAndPlace, PlacesAreSpreadOverTheReceptacle) {
   std::vector<double> across;  // offset from the middle, as a share of the half size
   int bowls = 0;
   for (int episode = 0; episode < 60; ++episode) {
-    table.start(0, episode);
+    table.start(episode);
     const std::string& name = table.task.objects(0)[1].name;
     std::vector<Vec3> found, again;
     table.task.places(table.world, {}, found);
@@ -275,7 +243,7 @@ TEST(PickAndPlace, PlacesBesideAnObjectAreOnAllSides) {
   Table table(PlaceKind::kNextTo);
   std::array<int, 4> sides{};
   for (int episode = 0; episode < 40; ++episode) {
-    table.start(0, episode);
+    table.start(episode);
     const Aabb other = world_box(table.world, table.body(1));
     std::vector<Vec3> found;
     table.task.places(table.world, {}, found);
@@ -291,7 +259,7 @@ TEST(PickAndPlace, StartThatIsAlreadySolvedIsRejected) {
   Table table(PlaceKind::kNextTo);
   int there = 0;
   for (int episode = 0; episode < 60; ++episode) {
-    table.start(0, episode);
+    table.start(episode);
     const std::string fault = table.task.start_error(table.world);
     const bool success = table.task.evaluate(table.world).success;
     there += success ? 1 : 0;
@@ -304,7 +272,7 @@ TEST(PickAndPlace, StartThatIsAlreadySolvedIsRejected) {
 TEST(PickAndPlace, ColourDistinguishesTwoReceptacles) {
   Table table(PlaceKind::kColor);
   for (int episode = 0; episode < 20; ++episode) {
-    table.start(0, episode);
+    table.start(episode);
     const std::string text = table.task.description(0), name = table.task.objects(0)[1].name;
     EXPECT_THAT(text, HasSubstr("in or on the " + name));
     EXPECT_EQ(table.task.referrals(0)[1].second.size(), 1u);
@@ -319,7 +287,7 @@ TEST(PickAndPlace, ColourDistinguishesTwoReceptacles) {
 
 TEST(PickAndPlace, PackingChoosesABox) {
   Table table(PlaceKind::kPacking);
-  table.start(0, 3);
+  table.start(3);
   EXPECT_THAT(table.task.description(0), HasSubstr("into the cardboard box"));
   const auto scene = nlohmann::json::parse(table.task.obs_scene(0));
   EXPECT_EQ(scene["task_type"], "packing");
