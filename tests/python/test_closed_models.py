@@ -3,7 +3,9 @@
 
 import io
 import struct
+import tracemalloc
 import zipfile
+import zlib
 
 import mujoco
 import numpy as np
@@ -78,6 +80,25 @@ def test_refused_archives(tmp_path):
         archive.read_archive(tmp_path / "link.zip")
     with pytest.raises(IsADirectoryError):
         archive.read_archive(tmp_path)
+
+
+@pytest.mark.parametrize("stated", (0, 1 << 16))
+def test_a_file_that_unpacks_to_more_than_it_states(tmp_path, stated):
+    """The bytes of 32 MB of zeros, whose directory states fewer: not more than those are unpacked."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    packed = b"".join(packer.compress(bytes(1 << 20)) for _ in range(32)) + packer.flush()
+    good = written(tmp_path / "a.zip", {"model.xml": b""}).read_bytes()
+    at, end = good.index(b"PK\1\2"), good.index(b"PK\5\6")
+    sizes = struct.pack("<LLL", zlib.crc32(bytes(stated)), len(packed), stated)
+    head = good[:14] + sizes + good[26:39]
+    entry = good[at : at + 16] + sizes + good[at + 28 : end]
+    (tmp_path / "a.zip").write_bytes(head + packed + entry + good[end : end + 16] + struct.pack("<LH", len(head + packed), 0))
+    tracemalloc.start()
+    with pytest.raises(ValueError, match=r"^the model archive .*a\.zip cannot be read: 'model.xml' does not unpack to the \d+ bytes that it states|Bad CRC-32"):
+        archive.read_archive(tmp_path / "a.zip")
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 2e6
 
 
 class _Twice:
