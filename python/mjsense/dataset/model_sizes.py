@@ -107,6 +107,11 @@ def unpacked_size(content: bytes, about: str) -> int:
     return most + sum(min(_MAX_RATIO * len(data), _MAX_TEXT) for kind, data in chunks if kind in _TEXTS)
 
 
+def text_size(content: bytes) -> int:
+    """Number of bytes, at most, to which the texts of a PNG file unpack without a limit of the reader."""
+    return sum(_MAX_RATIO * len(data) for kind, data in _chunks(content) if kind in _TEXTS)
+
+
 def _chunks(content: bytes) -> Iterator[tuple[bytes, memoryview]]:
     """Kind and data of each chunk of a PNG file."""
     at, view = 8, memoryview(content)
