@@ -62,8 +62,8 @@ def files_of(file: IO[bytes], about: object) -> dict[str, bytes]:
 
 
 def _content(archive: zipfile.ZipFile, member: zipfile.ZipInfo, about: object) -> bytes:
-    """The bytes of a file. At most one more than it states is unpacked: ZipFile.read() unpacks up to 2 GiB and then leaves out what
-    is too much."""
+    """The bytes of a file. At most one more than it states is unpacked. ZipFile.read() would unpack up to 2 GiB, of which it then
+    leaves out the rest."""
     stated, member.file_size = member.file_size, member.file_size + 1
     with archive.open(member) as file:
         content = file.read(stated + 1)
