@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
+import base64
 import importlib
+import json
 import os
 
 import numpy as np
@@ -9,6 +11,7 @@ import mjsense as mjs
 from mjsense import _core
 from mjsense.commands.start import main
 from mjsense.core import installed_files
+from mjsense.core.png import png_of
 
 
 @pytest.fixture
@@ -129,6 +132,27 @@ def test_converted_assets_have_materials_and_texture_roles(ball, tmp_path):
             assert np.linalg.norm(apart, axis=-1).max() == pytest.approx(0.5 * 2**0.5)
 
 
+def triangle(indices=(0, 1, 2), metallic=1, colours=b""):
+    """A glTF file."""
+
+    def uri(content):
+        return f"data:application/octet-stream;base64,{base64.b64encode(content).decode()}"
+
+    content = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes() + np.array(indices, "<u2").tobytes()
+    colour = {"baseColorTexture": {"index": 0}} if colours else {}
+    table = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
+        "materials": [{"pbrMetallicRoughness": {"metallicFactor": metallic, **colour}}],
+        "buffers": [{"byteLength": len(content), "uri": uri(content)}],
+        "bufferViews": [{"buffer": 0, "byteLength": 36}, {"buffer": 0, "byteOffset": 36, "byteLength": 6}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}, {"bufferView": 1, "componentType": 5123, "count": 3, "type": "SCALAR"}],
+    }  # fmt: skip
+    if colours:
+        table |= {"images": [{"uri": uri(colours)}], "textures": [{"source": 0}]}
+    return json.dumps(table).encode()
+
+
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
@@ -136,6 +160,9 @@ def test_converted_assets_have_materials_and_texture_roles(ball, tmp_path):
         ("x.glb", None, r"x.glb: no such file"),
         ("x.glb", b"glTF" + bytes(40), r"x.glb: cannot be read: "),
         ("x.obj", b"v 0 0 0\n", r"x.obj: (has no triangles|cannot be read)"),
+        ("x.gltf", triangle(indices=(0, 1, 900)), r"x.gltf: cannot be read: IndexError: index 900 is out of bounds"),
+        ("x.gltf", triangle(metallic="x"), r"x.gltf: cannot be read: "),
+        ("x.gltf", triangle(colours=png_of(np.zeros((8, 8, 3), np.uint8))[:-20]), r"x.gltf: cannot be read: OSError"),
         ("x.obj", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", r"x.obj: .*(not finite|cannot be read)"),
     ],
 )

@@ -3,7 +3,9 @@
 
 import io
 import struct
+import tracemalloc
 import zipfile
+import zlib
 
 import mujoco
 import numpy as np
@@ -78,6 +80,25 @@ def test_refused_archives(tmp_path):
         archive.read_archive(tmp_path / "link.zip")
     with pytest.raises(IsADirectoryError):
         archive.read_archive(tmp_path)
+
+
+@pytest.mark.parametrize("stated", (0, 1 << 16))
+def test_a_file_that_unpacks_to_more_than_it_states(tmp_path, stated):
+    """The bytes of 32 MB of zeros, whose directory states fewer: not more than those are unpacked."""
+    packer = zlib.compressobj(9, zlib.DEFLATED, -15)
+    packed = b"".join(packer.compress(bytes(1 << 20)) for _ in range(32)) + packer.flush()
+    good = written(tmp_path / "a.zip", {"model.xml": b""}).read_bytes()
+    at, end = good.index(b"PK\1\2"), good.index(b"PK\5\6")
+    sizes = struct.pack("<LLL", zlib.crc32(bytes(stated)), len(packed), stated)
+    head = good[:14] + sizes + good[26:39]
+    entry = good[at : at + 16] + sizes + good[at + 28 : end]
+    (tmp_path / "a.zip").write_bytes(head + packed + entry + good[end : end + 16] + struct.pack("<LH", len(head + packed), 0))
+    tracemalloc.start()
+    with pytest.raises(ValueError, match=r"^the model archive .*a\.zip cannot be read: 'model.xml' does not unpack to the \d+ bytes that it states|Bad CRC-32"):
+        archive.read_archive(tmp_path / "a.zip")
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 2e6
 
 
 class _Twice:
@@ -164,6 +185,52 @@ def test_sizes_are_refused_before_they_are_allocated(given, why):
     with pytest.raises(ValueError, match=why) as error:
         closed(**given)
     assert str(error.value).startswith("a.zip: model.xml: ")
+
+
+def png(width, height, depth, colours, pixels, chunks=()):
+    head = (b"IHDR", struct.pack(">IIBBBBB", width, height, depth, colours, 0, 0, 0))
+    parts = (head, *chunks, (b"IDAT", pixels), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in parts
+    )
+
+
+ZEROS = zlib.compress(bytes(1 << 22), 9)
+
+
+@pytest.mark.parametrize("asset", ("<texture name='t' type='2d' file='a.png'/>", "<hfield name='t' file='a.png' size='1 1 1 1'/>", "<texture name='t' type='cube' fileup='a.png'/>"))
+@pytest.mark.parametrize("content, why", [
+    (png(4, 4, 8, 2, ZEROS), "pixels unpack to more than the 4 x 4 pixels that it states"),
+    (png(64, 64, 8, 2, b"\x08\x1d" + ZEROS[2:]), "pixels unpack to more than the 64 x 64 pixels that it states"),  # states a window of 256 bytes
+    (png(64, 64, 8, 2, b"x\x9c" + b"\xff" * 2000), "pixels are damaged"),
+    (png(4, 4, 8, 2, zlib.compress(bytes(4 * 13)), [(b"zTXt", b"a\0\0" + ZEROS * 5)] * 70), f"the limit is {MAX_PIXELS}"),
+], ids=("pixels", "window", "damaged", "texts"))  # fmt: skip
+def test_an_image_that_unpacks_to_more_than_it_states(asset, content, why):
+    """MuJoCo unpacked 1.5 MB to 1.5 GB before it compared them with the size of the image."""
+    with pytest.raises(ValueError, match=f"^a.zip: model.xml: .*{why}"):
+        closed(asset, members={"a.png": content})
+
+
+@pytest.mark.parametrize("interlaced", (False, True))
+@pytest.mark.parametrize("mode", ("1", "L", "P", "RGB", "RGBA", "LA", "I;16"))
+@pytest.mark.parametrize("width, height", ((1, 1), (5, 3), (300, 1), (1, 300), (400, 300)))
+def test_images_of_all_kinds_are_read(mode, width, height, interlaced):
+    """Also those of one colour, which are packed most."""
+    image = pytest.importorskip("PIL.Image").new(mode, (width, height))
+    file = io.BytesIO()
+    image.save(file, "png", optimize=True)
+    content = file.getvalue()
+    if interlaced:  # Pillow writes none: all passes of zeros
+        bits = content[24] * {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}[content[25]]
+        passes = ((0, 8, 0, 8), (4, 8, 0, 8), (0, 4, 4, 8), (2, 4, 0, 4), (0, 2, 2, 4), (1, 2, 0, 2), (0, 1, 1, 2))
+        sizes = ((len(range(x, width, dx)), len(range(y, height, dy))) for x, dx, y, dy in passes)
+        size = sum(h * (1 + (w * bits + 7) // 8) for w, h in sizes if w)
+        palette = [(b"PLTE", bytes(3))] if content[25] == 3 else []
+        made = png(width, height, content[24], content[25], zlib.compress(bytes(size), 9), palette)
+        head = made[12:28] + b"\1"
+        content = made[:12] + head + struct.pack(">I", zlib.crc32(head)) + made[33:]
+    model = compile_closed({"model.xml": MODEL.format("<texture name='t' type='2d' file='a.png'/>", "").encode(), "a.png": content}, "a.zip")
+    assert (model.tex_width[0], model.tex_height[0]) == (width, height)
 
 
 def test_compiled_models_are_those_of_mujoco(tmp_path):

@@ -3,7 +3,9 @@
 
 import json
 import os
+import struct
 import zipfile
+import zlib
 from fractions import Fraction
 
 import h5py
@@ -290,6 +292,17 @@ def playlist(root, **_):
     (root / f"videos/{CAM}/chunk-000/file-000.mp4").write_text("#EXTM3U\n#EXTINF:1,\nhttp://127.0.0.1:1/x.ts\n#EXT-X-ENDLIST\n")
 
 
+def large_images(info, **_):
+    info["features"] |= {f"{CAM}_{i}": {"dtype": "video", "shape": [5792, 5792, 3], "names": None} for i in range(6)}
+
+
+def png_with_texts():
+    content = png_of(picture(0))
+    text = b"zTXt" + b"a\0\0" + zlib.compress(bytes(1 << 20), 9)
+    chunk = struct.pack(">I", len(text) - 4) + text + struct.pack(">I", zlib.crc32(text))
+    return content[:33] + 256 * chunk + content[33:]
+
+
 def image_bytes(content):
     def change(info, rows, **_):
         info["features"][CAM]["dtype"] = "image"
@@ -315,12 +328,60 @@ def image_bytes(content):
     (episode_value(f"videos/{CAM}/from_timestamp", float("nan")), "from_timestamp of .* is nan"), (playlist, "is neither an MP4 nor a Matroska file"),
     (image_bytes(b"#EXTM3U\nhttp://127.0.0.1:1/x.ts\n"), "is neither a PNG nor a JPEG file"), (image_bytes(None), "expected the bytes of a PNG or JPEG file"),
     (image_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\1\0\0\0\1\0\0"), "images of 65536 x 65536 pixels"),
-], ids=range(32))  # fmt: skip
+    (large_images, "one observation has more than 536870912 bytes"), (image_bytes(png_with_texts()), "its texts may unpack to .* bytes, the limit is"),
+    (row_value("episode_index", ["0"] * 6), "has no column episode_index of whole numbers"), (row_value("action", [b"x" * 20] * 6), "row 0 is b'xxx"),
+], ids=range(36))  # fmt: skip
 def test_values_of_data_sets(video, tmp_path, change, message):
     root = lerobot(tmp_path / "set", video, change)
     with pytest.raises(ValueError, match=message) as error:
         mjs.import_lerobot(root, tmp_path / "out")
     assert "\n" not in str(error.value) and str(root) in str(error.value) and not list(tmp_path.glob("out*"))
+
+
+def test_a_text_of_many_rows_is_not_copied_for_each(video, tmp_path, monkeypatch):
+    """Parquet stores a text once: 380 kB of a file were 4 GB of rows."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    from mjsense.dataset import lerobot_reader
+
+    monkeypatch.setattr(lerobot_reader, "_MAX_TABLE", 1 << 20)
+    root = lerobot(tmp_path / "set", video, image_bytes(b"\x89PNG" + bytes(400_000)))
+    assert (root / "data/chunk-000/file-000.parquet").stat().st_size < 100_000
+    with pytest.raises(ValueError, match=r"data/chunk-000/file-000.parquet: its rows have more than 1048576 bytes, which is the limit"):
+        mjs.import_lerobot(root, tmp_path / "out")
+    episodes = pa.table({"episode_index": [0], "length": [6], "tasks": [["x" * 1000] * 2000]})
+    pq.write_table(episodes, root / "meta/episodes/chunk-000/file-000.parquet")
+    with pytest.raises(ValueError, match=r"episodes/chunk-000/file-000.parquet: its rows have more than 1048576 bytes, which is the limit"):
+        mjs.import_lerobot(root, tmp_path / "out")
+    pq.write_table(episodes.set_column(0, "episode_index", pa.array([b"0" * 20], pa.binary(20))), root / "meta/episodes/chunk-000/file-000.parquet")
+    with pytest.raises(ValueError, match=r"the column 'episode_index' has values of more than 16 bytes"):
+        mjs.import_lerobot(root, tmp_path / "out")
+
+
+def test_images_in_several_row_groups(video, tmp_path):
+    """Each group has dictionaries of its own, and images that are too many for one follow it."""
+    import pyarrow.parquet as pq
+
+    def change(info, rows, **_):
+        info["features"][CAM]["dtype"] = "image"
+        rows[CAM] = [{"bytes": png_of(picture(t)), "path": f"{t}.png"} for t in range(6)]
+
+    path = lerobot(tmp_path / "set", video, change) / "data/chunk-000/file-000.parquet"
+    pq.write_table(pq.read_table(path), path, row_group_size=4, dictionary_pagesize_limit=200)
+    mjs.import_lerobot(tmp_path / "set", tmp_path / "out", crf=5)
+    (episode,) = mjs.Dataset(tmp_path / "out").episodes
+    frames = episode.video("cam")[:].astype(int)
+    assert all(np.abs(frames[t] - picture(t)).mean() < 6 for t in range(6))
+
+
+def test_arrays_that_do_not_fit_together(tmp_path, monkeypatch):
+    from mjsense.dataset import foreign_values
+
+    monkeypatch.setattr(foreign_values, "MAX_BYTES", 1 << 20)
+    path = robomimic(tmp_path / "a.hdf5", model=False, change=lambda file, demo: [demo.create_dataset(f"obs/a{i}", data=np.zeros((5, 8192))) for i in range(4)])
+    with pytest.raises(ValueError, match=r"data/demo_0: its arrays of numbers have 131\d+ bytes, the limit is 1048576"):
+        mjs.import_robomimic(path, tmp_path / "out")
 
 
 @pytest.mark.parametrize("name", ["../../x", "/abs", "", "-i", "a\nb", "a:b"])

@@ -2,6 +2,9 @@
 """Footers of Parquet files; pyarrow ends the process when it reads some damaged ones."""
 
 import contextlib
+import io
+import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +22,7 @@ def lerobot_reader(path):
     """Reads a table as the import of LeRobot data sets does."""
     source = object.__new__(LeRobotReader)
     source.root, source._tables = path.parent, pq
-    return lambda path: source._table(path, source._names(path))
+    return source._table
 
 
 @pytest.mark.parametrize("codec", ("NONE", "SNAPPY", "GZIP", "BROTLI", "ZSTD", "LZ4"))
@@ -50,3 +53,25 @@ def test_a_damaged_footer_does_not_end_the_process(tmp_path, reader):
             read(path)
             refused -= 1
     assert 0 < refused < 600
+
+
+def footer(content):
+    return io.BytesIO(b"PAR1" + content + struct.pack("<I", len(content)) + b"PAR1")
+
+
+def many(count, value):
+    """The field 1: a list of so many values of the kind of a struct."""
+    number = b"".join(bytes([count >> shift & 127 | (128 if count >> shift + 7 else 0)]) for shift in range(0, count.bit_length(), 7))
+    return b"\x19\xfc" + number + value * count
+
+
+@pytest.mark.parametrize("content", (b"\x19" * 100_000, b"\x1c" * 100_000, many(20_000, b"\0")), ids=("lists", "structs", "values"))
+def test_a_footer_is_not_larger_in_memory_than_columns_need(monkeypatch, content):
+    """Before, 100 kB of nested lists were a RecursionError, and 64 MB of empty structs took 5 GB."""
+    assert 500_000 < parquet_footer._MAX_VALUES < 5_000_000
+    monkeypatch.setattr(parquet_footer, "_MAX_VALUES", 10_000)
+    read = []
+    monkeypatch.setattr(parquet_footer._Reader, "_byte", lambda self, inner=parquet_footer._Reader._byte: (read.append(1), inner(self))[1])
+    with pytest.raises(ValueError, match=r"^x: not a Parquet file that can be read: its footer is damaged$"):
+        parquet_footer.read(Path("x"), footer(content))
+    assert len(read) < 10_100

@@ -306,6 +306,10 @@ def test_surroundings_of_openexr_pictures(tmp_path: Path, monkeypatch: pytest.Mo
             write(name, np.ascontiguousarray(pixels))
         with pytest.raises(ValueError, match=f"environment '.*sky.exr': {message}"):
             seen()
+    about = {"type": openexr.scanlineimage, "displayWindow": (np.zeros(2, np.int32), np.array([15, 7], np.int32))}
+    openexr.File([openexr.Part(dict(about), {"RGB": rgb}, name) for name in "ab"]).write(str(path))
+    with pytest.raises(ValueError, match=r"environment '.*sky.exr': 2 pictures; a file with one is expected"):
+        seen()
     write("RGB", rgb)
     from_exr = seen()
     texel = {(2, 0.5, 0): (128, 32, 0, 130), (0.25, 0.25, 0.25): (128, 128, 128, 127)}

@@ -194,6 +194,8 @@ def test_the_adapter_of_an_exports_features(rows):
     np.testing.assert_array_equal(commands["gripper"], [[7]])
     with pytest.raises(ValueError, match=r"'action' of shape \(1, 9\): must be \(H, 8\)"):
         made.commands({"action": [*range(9)]}, GROUPS)
+    with pytest.raises(ValueError, match=r"'action' of shape \(300000, 8\): must have at most 1048576 numbers"):
+        made.commands({"action": np.zeros((300_000, 8), np.uint8)}, GROUPS)
     for name in ("features", "droid"):  # of a controller that takes displacements
         with pytest.raises(ValueError, match="commands of the move group 'arm' are joint targets, and its controller takes other commands"):
             check(adapters.adapter_of(name, STREAMS, GROUPS), 2 * LOW, np.array([255.0] + [6.0] * 7))

@@ -14,9 +14,11 @@ fsspec = pytest.importorskip("fsspec")
 from fsspec.implementations.memory import MemoryFile
 
 import mjsense as mjs
-from mjsense.cluster import tools
-from mjsense.cluster.job import ShardResult
-from mjsense.dataset import limits
+from mjsense.cluster import driver, tools
+from mjsense.cluster import storage as cluster_storage
+from mjsense.cluster.job import Job, ShardResult
+from mjsense.cluster.storage import Storage
+from mjsense.dataset import limits, remote
 
 H5 = "trajectories_batch_1_of_1.h5"
 ROW = {"episode": 0, "path": f"house_0/{H5}", "trajectory": "traj_0", "seed": 5, "length": 5, "success": False, "outcome": "x", "task": "t"}
@@ -107,7 +109,7 @@ def test_an_index_that_unpacks_to_much_more(root, monkeypatch):
     assert limits.EPISODES == 10_000_000
     for content in (b"", b"PAR1", b"x" * 1000):
         (root / "index.parquet").write_bytes(content)
-        with pytest.raises(ValueError, match=r"index\.parquet: not an index that can be read"):
+        with pytest.raises(ValueError, match=r"index\.parquet: not a Parquet file that can be read"):
             mjs.Dataset(root)
 
 
@@ -135,13 +137,29 @@ def test_a_folder_of_a_link(root, tmp_path):
 
 @pytest.mark.parametrize(
     "change", [{"shard": {"number": -1, "first": 0, "count": 1}}, {"shard": {"number": "../../x", "first": 0, "count": 1}}, {"episodes": [{**ROW, "path": "../x"}]},
-               {"episodes": [7]}, {"episodes": [{**ROW, "length": "x"}]}, {"seconds": []}, {"more": 1}],
+               {"episodes": [7]}, {"episodes": [{**ROW, "length": "x"}]}, {"seconds": []}, {"more": 1}, {"failures": {"x": "y"}}],
 )  # fmt: skip
 def test_the_results_of_a_shard(change):
     good = {"shard": {"number": 0, "first": 0, "count": 1}, "fingerprint": "f", "episodes": [ROW], "succeeded": 0, "failed": 1, "steps": 4}
     assert ShardResult.parse(json.dumps(good).encode()).episodes == [ROW]
     with pytest.raises(ValueError, match=r"done\.json"):
         ShardResult.parse(json.dumps({**good, **change}).encode())
+
+
+def test_an_object_that_is_too_large_is_not_read(root, monkeypatch):
+    """Its size is checked before its bytes are in memory."""
+    address = upload(root, "bucket", index_of([ROW]), {"job.json": b"[1]"})
+    storage = Storage(address)
+    assert storage.read_all("*.json") == [b"[1]"] and storage.read("none.json") is None and storage.read_all("none*") == []
+    with pytest.raises(ValueError, match=r"job.json is a list, not an object"):
+        driver._claim(storage, Job(address, {"task": "pick"}), {}, resume=True)
+    system = fsspec.filesystem("memory")
+    monkeypatch.setattr(type(system), "cat_file", lambda *_: pytest.fail("it was read"))
+    for module in (remote, cluster_storage):
+        monkeypatch.setattr(module, "OBJECT_BYTES", 2)
+    for read in (lambda: mjs.Dataset(address), lambda: tools.repair(address), lambda: storage.read_all("*.json")):
+        with pytest.raises(ValueError, match=r"(index.parquet|job.json|\*.json:?) .*has|have (\d+) bytes, more than 2"):
+            read()
 
 
 def test_the_file_is_there(root):

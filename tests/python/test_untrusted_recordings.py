@@ -9,6 +9,7 @@ import os
 import re
 import resource
 import shutil
+import struct
 import time
 from fractions import Fraction
 
@@ -22,7 +23,10 @@ pytest.importorskip("av")
 import mjsense as mjs
 from mjsense.cluster import tools
 from mjsense.dataset.description import Description
+from mjsense.dataset.json_rows import decode
 from mjsense.dataset.places import is_plain_name, open_plain
+from mjsense.dataset.video_decoder import Packets
+from mjsense.evaluation import results
 from mjsense.exporting import export_lerobot, export_robomimic
 
 CAMERA = "wrist_camera"
@@ -466,3 +470,70 @@ def test_a_description_leaves_room_for_that_of_a_rendering(root):
         deep = [deep]
     describe(root, lambda about: about.update(unknown=deep))
     assert any("nested deeper than 60 levels" in error for error in errors_of(root))
+
+
+def boxes(content, path, change):
+    """The boxes of an MP4 file, of which the contents of one are changed."""
+    made, at = b"", 0
+    while at < len(content):
+        size, name = struct.unpack_from(">I4s", content, at)
+        inner = content[at + 8 : at + size]
+        if path and name == path[0]:
+            inner = boxes(inner, path[1:], change) if path[1:] else change(inner)
+        made += struct.pack(">I4s", 8 + len(inner), name) + inner
+        at += size
+    return made
+
+
+TABLES = [b"moov", b"trak", b"mdia", b"minf", b"stbl"]
+
+
+def test_packets_that_overlap(root):
+    """A file of a megabyte that states ten thousand packets of a megabyte takes hours to read."""
+    path = min(root.glob("house_0/*.mp4"))
+    content = path.read_bytes()
+    assert content.rindex(b"moov") > content.rindex(b"mdat")  # so that the tables can grow
+    Packets(path, Fraction(15), 5, (32, 24), "")
+    count, begin = 5, content.index(b"mdat") + 4
+    overlapping = boxes(content, [*TABLES, b"stsz"], lambda _: struct.pack(">III", 0, len(content) - begin - 1000, count))
+    overlapping = boxes(overlapping, [*TABLES, b"stsc"], lambda _: struct.pack(">IIIII", 0, 1, 1, 1, 1))
+    overlapping = boxes(overlapping, [*TABLES, b"stco"], lambda _: struct.pack(f">II{count}I", 0, count, *[begin] * count))
+    path.write_bytes(overlapping)
+    with pytest.raises(RuntimeError, match=r"\.mp4: has packets of \d+ bytes in \d+; its episode has 5 observations"):
+        Packets(path, Fraction(15), 5, (32, 24), "")
+
+
+def test_times_that_are_not_those_of_an_episode(root):
+    """PyAV takes numbers of frames of at most 63 bits."""
+    path = min(root.glob("house_0/*.mp4"))
+    slow = boxes(path.read_bytes().replace(b"edts", b"free"), [*TABLES, b"stts"], lambda _: struct.pack(">IIII", 0, 1, 5, 10**9))
+    path.write_bytes(boxes(slow, [*TABLES[:3], b"mdhd"], lambda inner: inner[:12] + struct.pack(">I", 1) + inner[16:]))
+    with pytest.raises(RuntimeError, match=r"\.mp4: has the time of frame -?\d+; its episode has 5 observations"):
+        Packets(path, Fraction(10**6), 5, (32, 24), "")
+
+
+@pytest.mark.parametrize("values, dtype", [(["1", "2"], object), ([None, "1"], object), ([["1"], ["2"]], object), ([1, "2"], object), ([1, None], float), ([True, 2], float), ([[1, 2], [3, 4]], float)])
+def test_texts_of_digits_stay_texts(values, dtype):
+    lines = [json.dumps({"a": value}).encode() for value in values]
+    rows = np.array([list(line.ljust(max(map(len, lines)), b"\0")) for line in lines], np.uint8)
+    ((found, _),) = decode(rows).values()
+    assert found.dtype == dtype and (dtype is float or found.tolist() == values)
+
+
+def test_results_of_any_numbers(root):
+    """The largest seed, and a policy's count that is none."""
+
+    def change(file):
+        file["traj_0"].attrs["seed"] = np.uint64(2**64 - 1)
+        for name, values in (("policy_num_retries", np.full(5, np.nan)), ("policy_latency", np.full(5, 1e300))):
+            file["traj_0/obs/extra"].pop(name, None)
+            file[f"traj_0/obs/extra/{name}"] = values
+
+    with changed(file_of(root)) as file:
+        change(file)
+    found = results(root)
+    assert [(row.seed, row.retries) for row in found.rows] == [(2**64 - 1, -1)]
+    assert found.to_table()["seed"].to_pylist() == [2**64 - 1]
+    (root / "evaluation.json").symlink_to(root / "elsewhere.json")
+    with pytest.raises(OSError, match=r"evaluation.json: is a symbolic link, which is not followed"):
+        results(root)

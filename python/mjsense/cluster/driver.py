@@ -15,6 +15,8 @@ from mjsense.cluster.index import write_index
 from mjsense.cluster.job import Job, Shard, ShardResult, run_shard
 from mjsense.cluster.storage import Storage
 from mjsense.cluster.tasks import check_pickle, cluster, running
+from mjsense.dataset import bounded_json
+from mjsense.dataset.limits import DESCRIPTION_BYTES
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class _Results:
     @staticmethod
     def read(storage: Storage, fingerprint: str) -> _Results:
         """The shards in a directory that belong to a job with this fingerprint."""
-        texts = storage.read_all(storage.find("shard_*/done.json"))
+        texts = storage.read_all("shard_*/done.json")
         results = (ShardResult.parse(text) for text in texts)
         return _Results(result for result in results if result.fingerprint == fingerprint)
 
@@ -99,7 +101,7 @@ def _claim(storage: Storage, job: Any, more: dict[str, Any], resume: bool) -> No
     found = storage.read("job.json")
     if found is None:
         return storage.write("job.json", json.dumps(ours, indent=1, sort_keys=True).encode())
-    theirs = json.loads(found)
+    theirs = bounded_json.parse_object(found, f"{job.out}/job.json", DESCRIPTION_BYTES)
     if not resume:
         raise FileExistsError(f"{job.out} contains a recording: continue it with resume (--resume), or choose another directory")
     for name in sorted({*ours, *theirs}):

@@ -89,6 +89,8 @@ class ShardResult:
         shard, rows = values.get("shard", {}), values.get("episodes", [])
         if set(shard) != {"number", "first", "count"} or not all(isinstance(n, int) and 0 <= n < 2**53 for n in shard.values()):
             raise ValueError("done.json: shard must have a number, the first attempt and the count")
+        if not all(isinstance(count, int) for count in values.get("failures", {}).values()):
+            raise ValueError("done.json: failures must be numbers of attempts by their reason")
         checked = [index.checked_row("done.json", i, row) for i, row in enumerate(rows)]
         if missing := kinds.keys() - values.keys() - {"failures", "seconds"}:
             raise ValueError(f"done.json has no {min(missing)}")

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mjsense.dataset.remote import open_address
+from mjsense.dataset.limits import OBJECT_BYTES
+from mjsense.dataset.remote import open_address, read_object
 
 
 class Storage:
@@ -26,16 +27,16 @@ class Storage:
 
     def read(self, path: str) -> bytes | None:
         """None if there is no such file."""
-        try:
-            return self._fs.cat_file(self._path(path))
-        except FileNotFoundError:
-            return None
+        return read_object(self._fs, self._path(path))
 
-    def read_all(self, paths: list[str]) -> list[bytes]:
-        """The contents of many files, which object stores read in parallel."""
-        if not paths:
+    def read_all(self, pattern: str) -> list[bytes]:
+        """The contents of the files that match a glob pattern, which object stores read in parallel."""
+        sizes = {path: about["size"] for path, about in self._fs.glob(self._path(pattern), detail=True).items()}
+        if not sizes:
             return []
-        found = self._fs.cat([self._path(path) for path in paths])
+        if sum(sizes.values()) > OBJECT_BYTES:
+            raise ValueError(f"{self._path(pattern)}: the files have {sum(sizes.values())} bytes, more than {OBJECT_BYTES}")
+        found = self._fs.cat(list(sizes))
         return list(found.values()) if isinstance(found, dict) else [found]
 
     def exists(self, path: str) -> bool:

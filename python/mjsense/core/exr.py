@@ -28,7 +28,10 @@ def radiance_file(path: str, content: bytes) -> bytes:
         copy = Path(folder, "picture.exr")
         copy.write_bytes(content)
         try:
-            header = openexr.File(str(copy), header_only=True).header()
+            opened = openexr.File(str(copy), header_only=True)
+            if len(opened.parts) != 1:  # the package would decode all of them
+                raise _BadPicture(f"{len(opened.parts)} pictures; a file with one is expected")
+            header = opened.header()
             window = header["dataWindow"]
             width, height = (int(x) + 1 for x in np.subtract(window[1], window[0]))
             if not 1 <= height <= _MAX_HEIGHT or width != 2 * height:

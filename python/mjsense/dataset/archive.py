@@ -43,7 +43,7 @@ def files_of(file: IO[bytes], about: object) -> dict[str, bytes]:
         with zipfile.ZipFile(file) as archive:
             members = archive.infolist()
             _check_members(members, file.seek(0, os.SEEK_END), about)
-            files = {member.filename: archive.read(member) for member in members}
+            files = {member.filename: _content(archive, member, about) for member in members}
     except (
         zipfile.BadZipFile,
         zlib.error,
@@ -59,6 +59,17 @@ def files_of(file: IO[bytes], about: object) -> dict[str, bytes]:
     if MODEL_FILE not in files:
         raise _refusal(about, f"it contains no {MODEL_FILE}")
     return files
+
+
+def _content(archive: zipfile.ZipFile, member: zipfile.ZipInfo, about: object) -> bytes:
+    """The bytes of a file. At most one more than it states is unpacked. ZipFile.read() would unpack up to 2 GiB, of which it then
+    leaves out the rest."""
+    stated, member.file_size = member.file_size, member.file_size + 1
+    with archive.open(member) as file:
+        content = file.read(stated + 1)
+    if len(content) != stated:
+        raise _refusal(about, f"{member.filename!r} does not unpack to the {stated} bytes that it states")
+    return content
 
 
 def archive_bytes(files: dict[str, bytes]) -> bytes:

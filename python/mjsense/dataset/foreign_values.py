@@ -9,7 +9,7 @@ import re
 import stat
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -110,13 +110,20 @@ def regular_inside(roots: tuple[Path, ...], path: Path, about: str) -> Path:
     return place
 
 
+def open_file(path: Path, about: str, limit: int | None = None) -> BinaryIO:
+    """A regular file, open for reading; a pipe that took its place is not waited for."""
+    file = os.fdopen(os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK), "rb")
+    status = os.fstat(file.fileno())
+    if not stat.S_ISREG(status.st_mode) or (limit is not None and status.st_size > limit):
+        file.close()
+        most = "" if limit is None else f" of at most {limit}"
+        raise ValueError(f"{about}: {path} has {status.st_size} bytes, expected a regular file{most}")
+    return file
+
+
 def read_bytes(path: Path, about: str, limit: int = MAX_BYTES) -> bytes:
     """The contents of a regular file."""
-    handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
-    with os.fdopen(handle, "rb") as file:
-        status = os.fstat(handle)
-        if not stat.S_ISREG(status.st_mode) or status.st_size > limit:
-            raise ValueError(f"{about}: {path} has {status.st_size} bytes, expected a regular file of at most {limit}")
+    with open_file(path, about, limit) as file:
         return file.read(limit + 1)
 
 

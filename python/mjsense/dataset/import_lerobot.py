@@ -117,7 +117,7 @@ class _Writer:
         self, out: str | Path, source: LeRobotReader, pose: JointPoses | None, episodes: Sequence[int], files: dict[str, Any]
     ) -> None:
         self._source, self._pose = source, pose
-        streams = Rows()
+        streams = Rows(str(source.root))
         self._cameras: dict[str, np.ndarray] = {}
         names: dict[str, str] = {}
         for key, feature in source.images.items():

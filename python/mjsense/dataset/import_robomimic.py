@@ -204,6 +204,9 @@ class _Demonstration:
                 )
             if key in ("rewards", "dones") and array.ndim != 1 and array.shape != (self.length, 1):
                 raise ValueError(f"{self.about}: {key} has the shape {[*array.shape]}, expected [{self.length}]")
+        # Images are read one by one, everything else as a whole.
+        if (size := sum(array.bytes for array in self.arrays.values() if array.ndim != 4)) > foreign.MAX_BYTES:
+            raise ValueError(f"{self.about}: its arrays of numbers have {size} bytes, the limit is {foreign.MAX_BYTES}")
         text = foreign.attribute(demo, "ep_meta", self.about)
         meta = bounded_json.parse_object(text, f"{self.about}: ep_meta", foreign.MAX_JSON) if text else {}
         self.language = foreign.text(meta.get("lang") or "", f"{self.about}: lang of ep_meta")
@@ -289,7 +292,7 @@ class _Writer:
         options: dict[str, Any],
     ) -> None:
         self._model = compile_archive(demo.archive[1], demo.about) if demo.archive[0] else None
-        self._streams = Rows()
+        self._streams = Rows(demo.about)
         self._rows: dict[
             str, tuple[np.ndarray, str]
         ] = {}  # row to write to, and the array of the demonstration that it comes from

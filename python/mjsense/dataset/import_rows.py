@@ -6,9 +6,10 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import math
 import re
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
@@ -27,13 +28,28 @@ if TYPE_CHECKING:
 else:
     mujoco = libmujoco.shared
 
+MAX_OBSERVATION = 1 << 29  # bytes of all streams together; an image of 2^25 pixels has 10^8
 NOT_A_NUMBER = " NaN: as in the imported file."
 """The end of the descriptions of its numbers."""
 _WRITTEN = "Values written into the previous state before this step; NaN: not written."
 
 
 class Rows(WrittenRows):
-    """The streams of a recording with one world."""
+    """The streams of a recording with one world.
+
+    Args:
+        about: The data set, for errors.
+    """
+
+    def __init__(self, about: str) -> None:
+        super().__init__()
+        self._about, self._bytes = about, 0
+
+    def add(self, name: str, dtype: str, shape: Sequence[int], description: str, **more: Any) -> np.ndarray:
+        self._bytes += math.prod(shape) * np.dtype(dtype).itemsize
+        if self._bytes > MAX_OBSERVATION:
+            raise ValueError(f"{self._about}: one observation has more than {MAX_OBSERVATION} bytes, which is the limit")
+        return super().add(name, dtype, shape, description, **more)
 
     def add_state(self, model: mujoco.MjModel) -> np.ndarray:
         """Declares the data for replay. Returns the array ``[1, nstate]`` to write MuJoCo's states to, in the order of

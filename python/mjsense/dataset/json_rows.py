@@ -26,11 +26,14 @@ def _array(values: list[Any]) -> np.ndarray:
     if all(isinstance(v, bool) for v in values):
         return np.array(values, bool)
     try:
-        return np.array(values, np.float64)
-    except (TypeError, ValueError, OverflowError):  # text, lists of different lengths, or integers that no float64 has
-        array = np.empty(len(values), object)
-        array[:] = values
-        return array
+        array = np.array(values)  # a conversion to float64 would read the text "1" as a number
+        if array.dtype.kind in "biuf" or (array.dtype == object and not any(isinstance(v, str) for v in array.flat)):
+            return np.array(values, np.float64)
+    except (TypeError, ValueError, OverflowError):  # lists of different lengths, or integers that no float64 has
+        pass
+    array = np.empty(len(values), object)
+    array[:] = values
+    return array
 
 
 def _check_leaf(what: str, path: str, number: int) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import io
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
@@ -17,12 +17,15 @@ from mjsense.core.optional import optional
 from mjsense.dataset import bounded_json, parquet_footer
 from mjsense.dataset import foreign_values as foreign
 from mjsense.dataset.lerobot_features import Feature
-from mjsense.dataset.model_sizes import image_size
+from mjsense.dataset.model_sizes import image_size, text_size
 
 STATE = "observation.state"
 RESULTS = ("next.reward", "next.success", "next.done")
 _COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 _MAX_VALUES, _MAX_TABLE = 1 << 27, 1 << 30  # numbers and bytes of one Parquet file; LeRobot writes files of 100 MB
+_CODECS = ("av1", "libdav1d", "libaom-av1", "h264", "hevc", "vp9", "libvpx-vp9", "ffv1")
+_MAX_IMAGE_TEXT = 1 << 28  # bytes of unpacked texts, which FFmpeg does not limit
+_MAX_FIXED = 16  # bytes of a value of a type of fixed length, such as float16
 
 
 def _needs(module: str) -> Any:
@@ -61,8 +64,7 @@ class LeRobotReader:
         self._tables = _needs("pyarrow.parquet")
         self.episodes: dict[int, dict[str, Any]] = {}
         for path in sorted(root.glob("meta/episodes/*/*.parquet")):
-            names = self._names(path)
-            for row in self._table(path, [name for name in names if not name.startswith("stats/")]).to_pylist():
+            for row in self._table(path, lambda name: not name.startswith("stats/")).to_pylist():
                 index = foreign.whole(row.get("episode_index"), f"{path}: episode_index", 0, 2**31)
                 if index in self.episodes:
                     raise ValueError(f"{path}: episode_index {index} is there twice")
@@ -77,25 +79,32 @@ class LeRobotReader:
             raise ValueError(f"{root}/meta/episodes contains no episodes (chunk-000/file-000.parquet ...)")
         self._read: tuple[Path, Any] = Path(), None
 
-    def _names(self, path: Path) -> list[str]:
+    def _table(self, path: Path, wanted: Callable[[str], bool] = lambda _: True) -> Any:
+        """The wanted columns of a Parquet file. A text is stored once, however many rows have it, so the bytes of all rows are
+        counted before rows are made of them."""
+        place, arrow = foreign.regular_inside((self.root,), path, str(path)), _needs("pyarrow")
         try:
-            return self._tables.read_schema(foreign.regular_inside((self.root,), path, str(path))).names
-        except Exception as error:  # pyarrow's errors have no common base class
-            raise self._damaged(path, error) from None
-
-    def _table(self, path: Path, columns: list[str]) -> Any:
-        """Columns of a Parquet file."""
-        place = foreign.regular_inside((self.root,), path, str(path))
-        try:
-            with open(place, "rb") as plain:
+            with foreign.open_file(place, str(path)) as plain:
                 footer = parquet_footer.read(path, plain)
-            if footer.rows > foreign.MAX_ROWS or footer.values > _MAX_VALUES or footer.bytes > _MAX_TABLE:
-                raise ValueError(
-                    f"{path}: has {footer.rows} rows, {footer.values} values and {footer.bytes} bytes, "
-                    f"the limits are {foreign.MAX_ROWS}, {_MAX_VALUES} and {_MAX_TABLE}"
-                )
-            return self._tables.read_table(place, columns=columns)
-        except Exception as error:
+                if footer.rows > foreign.MAX_ROWS or footer.values > _MAX_VALUES or footer.bytes > _MAX_TABLE:
+                    raise ValueError(
+                        f"{path}: has {footer.rows} rows, {footer.values} values and {footer.bytes} bytes, "
+                        f"the limits are {foreign.MAX_ROWS}, {_MAX_VALUES} and {_MAX_TABLE}"
+                    )
+                schema = self._tables.ParquetFile(arrow.PythonFile(plain, "r")).schema
+                columns = [schema.column(i) for i in range(len(schema))]
+                if long := [column.path for column in columns if column.length > _MAX_FIXED]:
+                    raise ValueError(f"{path}: the column {foreign.found(long[0])} has values of more than {_MAX_FIXED} bytes")
+                texts = [column.path for column in columns if column.physical_type == "BYTE_ARRAY"]
+                file = self._tables.ParquetFile(arrow.PythonFile(plain, "r"), read_dictionary=texts)
+                names, parts, size = [name for name in file.schema_arrow.names if wanted(name)], [], 0
+                for group in range(file.num_row_groups):  # each has dictionaries of its own
+                    parts.append(file.read_row_group(group, names))
+                    size += sum(_bytes_of(part) for column in parts[-1].columns for part in column.chunks)
+                    if size > _MAX_TABLE:
+                        raise ValueError(f"{path}: its rows have more than {_MAX_TABLE} bytes, which is the limit")
+                return arrow.concat_tables(parts) if parts else file.schema_arrow.empty_table().select(names)
+        except Exception as error:  # pyarrow's errors have no common base class
             raise self._damaged(path, error) from None
 
     def _damaged(self, path: Path, error: Exception) -> Exception:
@@ -137,11 +146,11 @@ class LeRobotReader:
             "task_index",
         ]
         if self._read[0] != path:
-            known = self._names(path)
-            self._read = path, self._table(path, [name for name in wanted if name in known])
+            self._read = path, self._table(path, wanted.__contains__)
         table = self._read[1]
-        if "episode_index" not in table.column_names:
-            raise ValueError(f"{path}: has no column episode_index")
+        kind = table.schema.field("episode_index").type if "episode_index" in table.column_names else None
+        if kind is None or not _needs("pyarrow").types.is_integer(kind):
+            raise ValueError(f"{path}: has no column episode_index of whole numbers")
         table = table.filter(_needs("pyarrow.compute").equal(table["episode_index"], index))
         length = episode["length"]
         if table.num_rows != length:
@@ -172,7 +181,7 @@ class LeRobotReader:
         path = self.root / "meta/tasks.parquet"
         if not path.exists():
             raise ValueError(f"{place} has {len(tasks)} tasks, and {path} is missing")
-        table = self._table(path, self._names(path)).to_pydict()
+        table = self._table(path).to_pydict()
         texts = next((values for key, values in table.items() if key in ("task", "__index_level_0__")), None)
         if texts is None or "task_index" not in table:
             raise ValueError(f"{path}: has the columns {', '.join(table)}, expected task and task_index")
@@ -201,13 +210,18 @@ class LeRobotReader:
         length, count = episode["length"], 0
         av = _needs("av")
         try:
-            with path.open("rb") as content, av.open(content, format=_container(content, path)) as file:
-                if not file.streams.video or file.streams.video[0].codec_context is None:
-                    raise ValueError(f"{path}: has no video")
-                stream = file.streams.video[0]
+            with (
+                foreign.open_file(path, str(path)) as content,
+                av.open(content, format=_container(content, path), options={"protocol_whitelist": "none"}) as file,
+            ):
+                stream = next(iter(file.streams.video), None)
+                if stream is None or stream.codec_context is None or stream.codec_context.name not in _CODECS:
+                    raise ValueError(f"{path}: has no video of a codec of LeRobot: AV1, H.264, HEVC, VP9 or FFV1")
                 feature.check_size(stream.codec_context.height, stream.codec_context.width, str(path))
                 file.seek(int(max(0.0, first) / stream.time_base), stream=stream)
                 for frame in file.decode(stream):
+                    if frame.pts is None:
+                        raise ValueError(f"{path}: has a frame without a time")
                     if float(frame.pts * stream.time_base) < first - 0.5 / float(self.rate):
                         continue
                     feature.check_size(frame.height, frame.width, str(path))
@@ -222,6 +236,17 @@ class LeRobotReader:
         except av.error.FFmpegError as error:
             raise ValueError(f"{path}: cannot be decoded: {' '.join(str(error).split())}") from None
         raise ValueError(f"{self.root}: the video of {key} has {count} frames of episode {index}, whose length is {length}")
+
+
+def _bytes_of(array: Any) -> int:
+    """Bytes of all values of a column's part, of which texts have dictionaries."""
+    arrow, compute = _needs("pyarrow"), _needs("pyarrow.compute")
+    kind = array.type
+    if arrow.types.is_dictionary(kind):
+        return compute.sum(compute.take(compute.binary_length(array.dictionary), array.indices)).as_py() or 0
+    if arrow.types.is_struct(kind):
+        return sum(_bytes_of(array.field(i)) for i in range(kind.num_fields))
+    return _bytes_of(array.values) if hasattr(array, "values") else array.nbytes
 
 
 def _numbers(values: list[Any], dtype: str, shape: tuple[int, ...], place: str) -> np.ndarray:
@@ -257,6 +282,8 @@ def _image(content: bytes, feature: Feature, place: str) -> np.ndarray:
     if kind == "png_pipe":
         width, height = image_size(content)
         feature.check_size(height, width, place)
+        if (size := text_size(content)) > _MAX_IMAGE_TEXT:
+            raise ValueError(f"{place}: its texts may unpack to {size} bytes, the limit is {_MAX_IMAGE_TEXT}")
     try:
         with av.open(io.BytesIO(content), format=kind) as file:
             if file.streams.video[0].codec_context is None:

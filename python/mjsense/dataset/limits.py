@@ -29,6 +29,8 @@ STEPS = 10_000_000
 """Observations of an episode: a week at 15 Hz."""
 EPISODES = 10_000_000
 """Rows of an index."""
+OBJECT_BYTES = 1 << 30
+"""An object of a bucket that is read into memory: an index, ``job.json`` or ``done.json``."""
 ROW_BYTES = 1 << 26
 """One row or one chunk of a dataset; a segmentation image of 4096 x 2048 pixels has 64 MiB."""
 CHUNKS = 1_000_000

@@ -14,6 +14,7 @@ from typing import Any, BinaryIO
 
 _FOOTER_BYTES = 1 << 26
 _MAX_DEPTH = 32
+_MAX_VALUES = 2_000_000  # a column of a row group has about 30; reading a million takes a second and 70 MB
 # Fields of FileMetaData, RowGroup, ColumnChunk and ColumnMetaData.
 _NUM_ROWS, _ROW_GROUPS, _COLUMNS, _TOTAL_BYTE_SIZE, _META_DATA, _CODEC, _NUM_VALUES = 3, 4, 1, 2, 3, 4, 5
 _CODECS = ("UNCOMPRESSED", "SNAPPY", "GZIP", "LZO", "BROTLI", "LZ4", "ZSTD", "LZ4_RAW")
@@ -59,7 +60,7 @@ class _Reader:
     """Thrift's compact protocol, without knowledge of the fields."""
 
     def __init__(self, data: bytes) -> None:
-        self._data, self._at = data, 0
+        self._data, self._at, self._values = data, 0, 0
 
     def _byte(self) -> int:
         self._at += 1
@@ -85,8 +86,6 @@ class _Reader:
 
     def fields(self, depth: int) -> dict[int, Any]:
         """A struct: field id -> value; texts and real numbers are left out."""
-        if depth > _MAX_DEPTH:
-            raise ValueError
         found, identifier = {}, 0
         while head := self._byte():
             identifier = identifier + (head >> 4) if head >> 4 else self._number()
@@ -94,6 +93,9 @@ class _Reader:
         return found
 
     def _value(self, kind: int, depth: int, *, alone: bool = False) -> Any:
+        self._values += 1
+        if depth > _MAX_DEPTH or self._values > _MAX_VALUES:
+            raise ValueError
         if kind in (1, 2):  # a bool: as a field it is in the head, in a list it is a byte
             return kind == 1 if alone else self._byte() == 1
         if kind == 3:

@@ -89,6 +89,14 @@ def open_plain(path: Path) -> PlainFile:
     return PlainFile(descriptor)
 
 
+def read_plain(path: Path, most: int) -> bytes:
+    """The bytes of a file, which is opened as by :func:`open_plain` and has at most so many."""
+    with open_plain(path) as file:
+        if file.size > most:
+            raise ValueError(f"{path} has {file.size} bytes, more than {most}")
+        return file.read(most)
+
+
 def _has_hole(descriptor: int, size: int) -> bool:
     """Some network file systems report that no blocks are allocated; they report no holes either."""
     found = os.lseek(descriptor, 0, os.SEEK_HOLE) < size

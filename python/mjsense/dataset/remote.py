@@ -13,6 +13,7 @@ from typing import Any
 
 from mjsense.core.optional import optional
 from mjsense.dataset.files import INDEX
+from mjsense.dataset.limits import OBJECT_BYTES
 from mjsense.dataset.places import is_plain_name, printable
 
 
@@ -30,6 +31,21 @@ def open_address(address: str) -> tuple[Any, str]:
     """fsspec's file system of an address or a path, and the path there."""
     url_to_fs = optional("fsspec.core", "ray", address).url_to_fs
     return url_to_fs(address)
+
+
+def read_object(system: Any, path: str) -> bytes | None:
+    """The bytes of an object; None if there is none. Its size is checked before it is read into memory.
+
+    Raises:
+        ValueError: It is larger than any that is written.
+    """
+    try:
+        size = system.info(path).get("size")
+    except FileNotFoundError:
+        return None
+    if not isinstance(size, int) or size > OBJECT_BYTES:
+        raise ValueError(f"{printable(path)} has {size} bytes, more than {OBJECT_BYTES}")
+    return system.cat_file(path)
 
 
 @dataclass(frozen=True)
@@ -90,7 +106,8 @@ def resolved(root: str | Path) -> tuple[Path, Remote | None]:
     system, base = open_address(address)
     if "file" in (protocol := (system.protocol,) if isinstance(system.protocol, str) else system.protocol) or "local" in protocol:
         return Path(base), None
-    small = {name: system.cat_file(f"{base}/{name}") for name in (INDEX, "job.json") if system.exists(f"{base}/{name}")}
+    found = {name: read_object(system, f"{base}/{name}") for name in (INDEX, "job.json")}
+    small = {name: content for name, content in found.items() if content is not None}
     if INDEX in small:
         version = small[INDEX]
     elif not (files := system.find(base, detail=True)):

@@ -20,9 +20,11 @@ from mjsense.core.declared_fields import declared_fields, given_options
 from mjsense.core.old_names import old_argument
 from mjsense.core.progress_line import line_of
 from mjsense.dataset import bounded_json, render_cameras
+from mjsense.dataset.archive import MAX_BYTES
 from mjsense.dataset.dataset import Dataset, by_house, opened
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
 from mjsense.dataset.hdf5 import open_h5
+from mjsense.dataset.places import read_plain
 from mjsense.dataset.playback import archive_of, inputs_of, where
 from mjsense.dataset.render_cameras import RenderCamera
 from mjsense.recording.ffmpeg import use_installed_ffmpeg
@@ -177,7 +179,7 @@ class _House:
             **given_options("FilesCfg", options),
             "episodes": len(self._episodes),
             "house": first.house or 0,
-            "archive": (archive.name, archive.read_bytes()),
+            "archive": (archive.name, read_plain(archive, MAX_BYTES)),
         }
         use_installed_ffmpeg()
         text = json.dumps(settings, sort_keys=True, separators=(",", ":"))

@@ -117,6 +117,7 @@ class Packets:
                 raise RuntimeError(
                     f"{path}: its images have {self.size[0]} x {self.size[1]} pixels, the recording states {size[0]} x {size[1]}"
                 )
+            stored = 0
             for packet in container.demux(stream):
                 if not packet.size or packet.pts is None or packet.pos is None or stream.time_base is None:
                     continue  # the end of the stream
@@ -129,6 +130,10 @@ class Packets:
                     raise RuntimeError(f"{path}: the file does not contain the bytes of its packet {len(self.sizes)}")
                 at = packet.pts * stream.time_base * fps
                 frame = round(at)
+                stored += packet.size
+                if stored > file.size or not -frames <= frame <= 2 * frames:
+                    why = f"the time of frame {frame}" if stored <= file.size else f"packets of {stored} bytes in {file.size}"
+                    raise RuntimeError(f"{path}: has {why}; its episode has {frames} observations")
                 self.exact &= at == frame
                 if packet.is_keyframe:
                     self.keys.append(len(self.sizes))

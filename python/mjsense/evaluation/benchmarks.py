@@ -24,7 +24,7 @@ import numpy as np
 from mjsense import _core
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.dataset import Dataset, Episode, bounded_json
-from mjsense.dataset.places import is_plain_name
+from mjsense.dataset.places import is_plain_name, open_plain, read_plain
 from mjsense.tasks.making import make_vec
 from mjsense.tasks.recording import record
 from mjsense.tasks.vector import TaskVectorEnv
@@ -78,11 +78,8 @@ class Benchmark:
             path = _SHIPPED / f"{folder.removeprefix(PREFIX)}.json"
         elif not path.is_file():
             raise FileNotFoundError(f"benchmark: '{self.folder}' has no {FILE}")
-        with open(path, "rb") as file:
-            text = file.read(_FILE_BYTES + 1)
-        table = bounded_json.parse(text, str(path), _FILE_BYTES)
-        if not isinstance(table, dict):
-            raise ValueError(f"{path} is {bounded_json.kind_of(table)}, not an object")
+        text = path.read_bytes() if path.parent == _SHIPPED else read_plain(path, _FILE_BYTES)
+        table = bounded_json.parse_object(text, str(path), _FILE_BYTES)
         if table.get("format") != _FORMAT:
             raise ValueError(f"{path}: format is {table.get('format')!r}; this version of mjsense reads {_FORMAT}")
         self.checksum = _checksum(table)
@@ -353,7 +350,7 @@ def _checksums(folder: Path, depth: int = 0, prefix: str = "") -> Iterator[tuple
         if entry.is_dir(follow_symlinks=False) and depth < _MAX_DEPTH:
             yield from _checksums(folder / entry.name, depth + 1, f"{prefix}{entry.name}/")
         elif entry.is_file(follow_symlinks=False):
-            with open(entry.path, "rb") as file:
+            with open_plain(folder / entry.name) as file:
                 yield f"{prefix}{entry.name}", hashlib.file_digest(file, "sha256").hexdigest()
         else:
             raise ValueError(f"'{entry.path}' is neither a file nor a folder of a benchmark")

@@ -11,6 +11,7 @@ from typing import Any
 
 from mjsense.core.representations import plain
 from mjsense.dataset import Dataset, bounded_json
+from mjsense.dataset.places import read_plain
 from mjsense.evaluation.rows import Row, key_of
 
 FILE = "evaluation.json"
@@ -21,11 +22,10 @@ _PARTS = ("policy", "benchmark", "data", "settings")
 def evaluation_of(root: Path) -> dict[str, Any]:
     """The contents of ``evaluation.json``; an empty object for other recordings."""
     path = root / FILE
-    if not path.is_file():
+    try:
+        table = bounded_json.parse_object(read_plain(path, _FILE_BYTES), str(path), _FILE_BYTES)
+    except FileNotFoundError:
         return {}
-    with open(path, "rb") as file:
-        text = file.read(_FILE_BYTES + 1)
-    table = bounded_json.parse_object(text, str(path), _FILE_BYTES)
     for part in _PARTS:
         if part in table and not isinstance(table[part], (dict, type(None))):
             raise ValueError(f"{path}: {part} is {bounded_json.kind_of(table[part])}; it must be an object")

@@ -12,6 +12,7 @@ from typing import Any
 
 from mjsense import _core
 from mjsense.core.errors import printable
+from mjsense.dataset.places import open_plain
 from mjsense.evaluation.benchmarks import DEFAULTS
 from mjsense.evaluation.molmospaces_episodes import FILE, MolmoSpacesEpisode, episodes_of, files_of, read_episode
 
@@ -30,7 +31,7 @@ def is_molmospaces(task: Any) -> bool:
     path = folder / FILE
     if not path.is_file():
         return bool(files_of(folder))
-    with open(path, "rb") as file:
+    with open_plain(path) as file:
         return file.read(100).lstrip()[:1] == b"["
 
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from mjsense.core.errors import did_you_mean
 from mjsense.dataset import bounded_json
-from mjsense.dataset.places import open_plain, printable
+from mjsense.dataset.places import printable, read_plain
 from mjsense.evaluation.benchmarks import IMAGE_OPTIONS, checked_recipe
 
 FILE = "benchmark.json"
@@ -87,8 +87,7 @@ def episodes_of(folder: Path) -> Iterator[tuple[str, Any]]:
     """(place, value) of each episode, not checked."""
     path = folder / FILE
     if path.is_file():
-        with open_plain(path) as file:
-            table = bounded_json.parse(file.read(FILE_BYTES + 1), str(path), FILE_BYTES, MAX_VALUES)
+        table = bounded_json.parse(read_plain(path, FILE_BYTES), str(path), FILE_BYTES, MAX_VALUES)
         if not isinstance(table, list) or not 1 <= len(table) <= MAX_EPISODES:
             raise ValueError(f"{path} is {bounded_json.kind_of(table)}; expected a list of 1 to {MAX_EPISODES} episodes")
         yield from ((f"{path}: episode {number}", one) for number, one in enumerate(table))
@@ -96,8 +95,7 @@ def episodes_of(folder: Path) -> Iterator[tuple[str, Any]]:
     for number, file in enumerate(files_of(folder)):
         if number >= MAX_EPISODES:
             raise ValueError(f"{folder} has more than {MAX_EPISODES} episodes")
-        with open_plain(file) as opened:
-            yield str(file), bounded_json.parse(opened.read(EPISODE_BYTES + 1), str(file), EPISODE_BYTES)
+        yield str(file), bounded_json.parse(read_plain(file, EPISODE_BYTES), str(file), EPISODE_BYTES)
 
 
 def files_of(folder: Path) -> list[Path]:

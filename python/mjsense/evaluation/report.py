@@ -59,7 +59,8 @@ class Results:
         arrow = require_parquet()
         columns = {field.name: [_known(getattr(row, field.name)) for row in self.rows] for field in dataclasses.fields(Row)}
         types = {"int": arrow.int64(), "bool": arrow.bool_(), "float": arrow.float64(), "str": arrow.string()}
-        schema = arrow.schema([(field.name, types[str(field.type)]) for field in dataclasses.fields(Row)])
+        kinds = {field.name: types[str(field.type)] for field in dataclasses.fields(Row)}
+        schema = arrow.schema({**kinds, "seed": arrow.uint64()})
         return arrow.table(columns, schema=schema)
 
     def to_html(self) -> str:

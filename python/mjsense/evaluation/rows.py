@@ -85,7 +85,7 @@ def _row(episode: Episode) -> Row:
     scene, settings, streams = episode.obs_scene, episode.settings, episode.streams
     flags = np.asarray(episode["success"], bool) if "success" in streams else np.zeros(episode.length, bool)
     name, _, part = _word(settings.get("scene")).partition("@")
-    retries, asked = "obs/extra/policy_num_retries", _numbers(episode, LATENCY)
+    given, asked = _numbers(episode, "obs/extra/policy_num_retries"), _numbers(episode, LATENCY)
     quality = episode.quality
     return Row(
         episode=episode.number,
@@ -95,7 +95,7 @@ def _row(episode: Episode) -> Row:
         success_once=bool(flags.any()) or episode.success,
         steps=max(0, episode.length - 1),
         time_to_success_s=_time_to_success(flags, float(episode.fps)) if episode.success else math.nan,
-        retries=int(_numbers(episode, retries)[-1]) if retries in streams and episode.length else -1,
+        retries=int(given[-1]) if len(given) and 0 <= given[-1] < 2**31 else -1,
         object=_word(scene.get("object_name")),
         scene=name,
         split=_word(settings.get("split")) or part,

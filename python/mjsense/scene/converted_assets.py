@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -56,14 +57,16 @@ def convert_assets(
     if not 0 < scale < float("inf"):
         raise ValueError(f"{source}: scale is {scale}: must be positive")
     frame = np.diag([scale, scale, scale, 1.0]) @ (_Y_UP if (up or _UP[kind]) == "y" else np.eye(4))
-    parts = list(_parts(source, frame))
+    with _reading(source):
+        parts = list(_parts(source, frame))
     if not parts:
         raise ValueError(f"{source}: has no triangles")
     with new_output(out) as folder:
         folder.mkdir()
         writer = _Writer(source, folder)
         for vertices, faces, normals, coordinates, material in parts:
-            writer.add(vertices, faces, normals, coordinates, material, contacts)
+            with _reading(source, OSError):  # the disk may be full
+                writer.add(vertices, faces, normals, coordinates, material, contacts)
         name = f"{_name(source.stem)}.xml"
         writer.save(folder / name)
     return Path(out) / name
@@ -73,6 +76,23 @@ def _name(text: str) -> str:
     return "".join(c if c.isalnum() and c.isascii() else "_" for c in text) or "asset"
 
 
+@contextlib.contextmanager
+def _reading(source: Path, *other: type[Exception]) -> Iterator[None]:
+    """Errors of trimesh, Pillow and NumPy as one that names the file: they raise whatever they meet in a damaged file.
+
+    Args:
+        other: Errors that have other reasons.
+    """
+    try:
+        yield
+    except other:
+        raise
+    except Exception as error:
+        if isinstance(error, (ValueError, ModuleNotFoundError)) and str(error).startswith((f"{source}: ", "Converting assets")):
+            raise
+        raise ValueError(f"{source}: cannot be read: {type(error).__name__}: {' '.join(str(error).split())[:200]}") from error
+
+
 def _loaded(source: Path) -> Any:
     trimesh = optional("trimesh", "convert", "Converting assets")
     optional("PIL", "convert", "Converting assets")
@@ -80,10 +100,7 @@ def _loaded(source: Path) -> Any:
         raise ValueError(f"{source}: no such file")
     if source.stat().st_size > _MAX_BYTES:
         raise ValueError(f"{source}: has {source.stat().st_size} bytes: at most {_MAX_BYTES} are read")
-    try:
-        return trimesh.load_scene(source, process=False)
-    except Exception as error:  # trimesh and Pillow raise whatever they meet in a damaged file
-        raise ValueError(f"{source}: cannot be read: {type(error).__name__}: {str(error)[:200]}") from error
+    return trimesh.load_scene(source, process=False)
 
 
 def _parts(source: Path, frame: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None, Any]]:
@@ -211,7 +228,8 @@ class _Writer:
             raise ValueError(
                 f"{self._source}: a texture has {image.size[0]} x {image.size[1]} pixels: at most {_MAX_PIXELS} are read"
             )
-        return np.asarray(image.convert(mode))
+        with _reading(self._source):  # Pillow decodes here, and calls what is damaged an OSError
+            return np.asarray(image.convert(mode))
 
     def _add_layer(self, material: ElementTree.Element, role: str, pixels: np.ndarray, linear: bool = False) -> None:
         from PIL import Image

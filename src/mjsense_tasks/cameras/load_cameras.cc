@@ -5,13 +5,12 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/fields/toml_fields.h"
 #include "mjsense/core/files/data_file.h"
+#include "mjsense/core/files/regular_file.h"
 #include "mjsense_tasks/cameras/frozen_cameras.h"
 
 namespace mjsense::tasks::cameras {
@@ -30,14 +29,6 @@ std::string folder_of(std::string_view robot_file) {
 
 DataFolder embedded(const std::string& folder) {
   return {"camera system", std::string_view(folder).substr(kEmbedded.size()), kTail};
-}
-
-std::string read_text(const std::string& path) {
-  std::ifstream in(path);
-  if (!in) throw ValueError(fmt::format("{}: no such file", path));
-  std::stringstream text;
-  text << in.rdbuf();
-  return text.str();
 }
 
 }  // namespace
@@ -63,7 +54,7 @@ CameraSystemCfg load_camera_system(std::string_view name, std::string_view robot
     return load_camera_system(name.substr(slash + 1), other, prefix);
   }
   if (name.ends_with(kFrozen)) {
-    CameraSystemCfg cfg = read_frozen(read_text(std::string(name)), prefix, name);
+    CameraSystemCfg cfg = read_frozen(read_text_file(std::string(name)), prefix, name);
     cfg.name = fs::path(name).stem().string();
     check_fields(cfg, fmt::format("camera system '{}'", cfg.name));
     return cfg;

@@ -17,6 +17,8 @@ from mjsense.sensors.row_declarations import is_image
 
 PROMPT, ACTIONS = "prompt", "actions"
 """Keys of the instruction and of the actions, unless an adapter chooses others."""
+MAX_ACTIONS = 1 << 20
+"""Numbers of the actions of an answer, which are kept for each world."""
 SEED, EPISODE = "mjsense/seed", "mjsense/episode"
 """Keys of the episode's seed and number in messages to ``mjsense serve``."""
 MJSENSE = "mjsense"
@@ -212,6 +214,8 @@ def _chunk(value: Any, key: str) -> np.ndarray:
         array = np.asarray("lists")
     if array.dtype.kind not in "biuf":
         raise ValueError(f"the server's answer has '{key}' that is not an array of numbers")
+    if array.size > MAX_ACTIONS:
+        raise ValueError(f"the server's answer has '{key}' of shape {array.shape}: must have at most {MAX_ACTIONS} numbers")
     if array.ndim not in (1, 2) or 0 in array.shape:
         raise ValueError(f"the server's answer has '{key}' of shape {array.shape}: must be (n,) or (H, n)")
     return array.reshape(-1, array.shape[-1]).astype(np.float64)

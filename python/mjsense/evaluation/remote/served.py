@@ -227,7 +227,8 @@ def _nested(numbers: Mapping[str, np.ndarray], names: list[str] | None) -> dict[
             raise _missing(name, numbers)
         chosen |= inside
     for name in chosen:
-        if parent := next((one for one in chosen if name.startswith(f"{one}/")), None):
+        parts = name.split("/")
+        if parent := next((one for i in range(1, len(parts)) if (one := "/".join(parts[:i])) in chosen), None):
             raise BadRequest(f"the observation has '{parent}' and '{name}'")
     return nest({name: tuple(name.split("/")) for name in chosen}, {name: array[None] for name, array in chosen.items()})
 
