@@ -285,6 +285,7 @@ def test_failures_are_kept_only_on_request(mjsense):
     summary = json.loads(done.stdout)
     assert summary["kept"] == 0 and summary["failures"] == {"horizon reached: the object is not lifted": 3}
     assert "stopped after 3 attempts" in done.stderr
+    assert not [path for path in (mjsense.folder / "data").rglob("*") if path.is_file()]  # the model, without an episode, is removed
 
 
 def test_recording_contains_the_reason_of_a_failure(mjsense):

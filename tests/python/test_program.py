@@ -48,7 +48,7 @@ def test_verify_says_nothing_of_a_recording_if_a_package_is_missing(tmp_path):
     (("import",), "mjsense: import: the argument 'format' is missing: one of robomimic, lerobot; see mjsense import --help"),
     (("scan", "x.xml"), "mjsense: scan: the option --frame is missing: The frame that carries the lidar: site:NAME, body:NAME, geom:NAME "
      "or camera:NAME; see mjsense scan --help"),
-    (("assets", "install"), "mjsense: assets: the argument 'names' is missing: install: sources of objects, such as robosuite. convert: a "
+    (("assets", "install"), "mjsense: assets: the argument 'NAME' is missing: install: sources of objects, such as robosuite. convert: a "
      ".glb, .gltf or .obj file, and the folder to make; see mjsense assets --help"),
     (("nothing",), "mjsense: no command 'nothing'; see mjsense --help"),
 ])  # fmt: skip
