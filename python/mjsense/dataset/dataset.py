@@ -74,6 +74,8 @@ class Dataset:
     ) -> None:
         self.root, source = resolved(root)
         """The folder or file; of an address, its copy on this machine."""
+        if cache_mb < 0:
+            raise ValueError(f"Dataset(): cache_mb is {cache_mb:g}: must be at least 0")
         entries, recordings = entries_of(self.root, source)
         self._store = Store(recordings, int(cache_mb * 1e6))
         chosen = [Episode(entry, i, self._store) for i, entry in enumerate(entries)]
@@ -382,7 +384,10 @@ def _expand(name: str, known: Mapping[str, Stream]) -> list[str]:
 
 
 def _steps(name: str, seconds: Sequence[float], fps: Fraction, tolerance_s: float) -> list[int]:
-    steps = [round(float(s) * float(fps)) for s in seconds]
+    try:
+        steps = [round(float(s) * float(fps)) for s in seconds]
+    except (TypeError, ValueError, OverflowError):
+        raise TypeError(f"delta_timestamps['{name}'] is {seconds!r:.100}: must be a list of numbers, in seconds") from None
     off = [s for s, n in zip(seconds, steps) if abs(float(s) - n / float(fps)) > tolerance_s]
     if off:
         nearest = round(off[0] * float(fps)) or (1 if off[0] > 0 else -1)
