@@ -126,7 +126,9 @@ def _record(arguments: argparse.Namespace, options: dict[str, Any], *, sheet: bo
             print(f"\ncontact sheet, every camera over time ({shown}): {path}")
     for damage in made["work"]["damage"]:
         tell(f"mjsense: {damage}")
-    if made["interrupted"]:
+    if made["interrupted"] and not made["kept"]:
+        tell("interrupted: no episode is finished yet. Continue with --resume.")
+    elif made["interrupted"]:
         tell(
             "interrupted: the finished episodes are safe. Continue with --resume, or finish with `mjsense repair "
             f"{made['path']}`."
