@@ -347,6 +347,9 @@ def test_resumed_recording_equals_an_uninterrupted_one(mjsense, signals):
         assert code == -signal.SIGKILL
     else:
         assert code == 1 and "Continue with --resume" in err
+        house = mjsense.folder / "data/house_0"
+        finished = [*house.glob("*.h5"), *house.glob(".recording/episode_????????")]
+        assert ("mjsense repair" in err) == bool(finished)  # which needs a finished episode
     mjsense(*args, "--worlds", 1, "--out", "data", "--resume", "-q")
     mjsense(*args, "--worlds", 4, "--out", "whole", "-q")
     assert contents(mjsense.folder / "data") == contents(mjsense.folder / "whole")

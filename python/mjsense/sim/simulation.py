@@ -179,7 +179,7 @@ class Simulation(KnownAttributes, metaclass=ABCMeta):  # WarpSimulation is regis
             ("seed", self.seed),
         ]
         facts += [
-            (f"{name} (MuJoCo's warning)", f"{counts.sum()} times, in {counted(np.count_nonzero(counts), 'world')}")
+            (f"{name} (MuJoCo's warning)", f"{counts.sum()} times, in {counted(int(np.count_nonzero(counts)), 'world')}")
             for name, counts in self.warning_counts.items()
         ]
         own = "".join(sensor._repr_html_() for sensor in self._python)
