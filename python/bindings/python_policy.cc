@@ -11,6 +11,7 @@
 #include <cmath>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense_tasks/rollout/rollout.h"
 #include "python/bindings/fields.h"
 #include "python/bindings/numpy.h"
@@ -184,9 +185,8 @@ void PythonPolicy::call_act() {
   // Worlds in the middle of a chunk continue it.
   if (before > 1 && std::ranges::any_of(chunk_.left, [](std::size_t left) { return left > 0; })) {
     if (before != chunk_.steps) {
-      throw ValueError(
-          fmt::format("{} returned {} steps, and {} before: a chunk has always as many",
-                      place("act"), chunk_.steps, before));
+      throw ValueError(fmt::format("{} returned {}, and {} before: a chunk has always as many",
+                                   place("act"), counted(chunk_.steps, "step"), before));
     }
     const std::size_t row = before * n_;
     for (std::size_t w = 0; w < B; ++w) {
@@ -278,8 +278,8 @@ void PythonPolicy::read_group(nb::handle value, std::size_t first, std::size_t w
   }
   const std::size_t steps = chunk ? array.shape(1) : 1;
   if (chunk_.steps != 0 && chunk_.steps != steps) {
-    throw ValueError(fmt::format("{}: '{}' has {} steps, another group {}", place("act"), what,
-                                 steps, chunk_.steps));
+    throw ValueError(fmt::format("{}: '{}' has {}, another group {}", place("act"), what,
+                                 counted(steps, "step"), chunk_.steps));
   }
   chunk_.steps = steps;
   chunk_.values.resize(B * steps * n_);
@@ -322,8 +322,8 @@ void PythonPolicy::read_phases() {
     nb::object array = as_array_.get()(policy_.get().attr(attribute), nb::arg("dtype") = "int64");
     const auto values = nb::cast<Ints>(array);
     if (values.size() != out.size()) {
-      throw ValueError(fmt::format("policy '{}': {} has {} values for {} worlds", name_, attribute,
-                                   values.size(), out.size()));
+      throw ValueError(fmt::format("policy '{}': {} has {} for {}", name_, attribute,
+                                   counted(values.size(), "value"), counted(out.size(), "world")));
     }
     std::copy_n(values.data(), out.size(), out.begin());
   };

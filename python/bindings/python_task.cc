@@ -10,6 +10,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/observe/suite.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense_tasks/episode/object_sensors.h"
@@ -25,8 +26,8 @@ using Values = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::
 Pose read_pose(nb::handle value, const std::string& context) {
   const auto numbers = nb::cast<std::vector<double>>(value);
   if (numbers.size() != 7) {
-    throw ValueError(fmt::format("{} returned {} numbers, a pose has 7: position and quaternion",
-                                 context, numbers.size()));
+    throw ValueError(fmt::format("{} returned {}, a pose has 7: position and quaternion", context,
+                                 counted(numbers.size(), "number")));
   }
   return {vec3(numbers.data()), quat(numbers.data() + 3)};
 }

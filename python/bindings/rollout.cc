@@ -17,6 +17,7 @@
 #include <numeric>
 
 #include "mjsense/core/fields/fields.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense_tasks/rollout/record_job.h"
 #include "mjsense_tasks/rollout/registry.h"
 #include "mjsense_tasks/scenes/scene_file.h"
@@ -276,7 +277,8 @@ class PyRollout {
   void set_actions(const Commands& values, std::optional<Flags> done) {
     check(values.shape(0), values.shape(1), "(B, n)");
     if (done && done->size() != values.shape(0))
-      throw ValueError(fmt::format("done: {} flags for {} worlds", done->size(), values.shape(0)));
+      throw ValueError(fmt::format("done: {} for {}", counted(done->size(), "flag"),
+                                   counted(values.shape(0), "world")));
     const double* at = values.data();
     const bool* flags = done ? done->data() : nullptr;
     sim_lock_->change("set_actions", [&] {
@@ -348,8 +350,9 @@ class PyRollout {
   void check(std::size_t worlds, std::size_t width, const char* what) const {
     if (worlds == static_cast<std::size_t>(rollout_->num_worlds()) && width == this->width())
       return;
-    throw ValueError(fmt::format("actions: {} worlds of {} commands, expected {} = {} worlds of {}",
-                                 worlds, width, what, rollout_->num_worlds(), this->width()));
+    throw ValueError(fmt::format("actions: {} of {}, expected {} = {} of {}",
+                                 counted(worlds, "world"), counted(width, "command"), what,
+                                 counted(rollout_->num_worlds(), "world"), this->width()));
   }
   tasks::robots::Action action(const double* commands) const {
     tasks::robots::Action action;

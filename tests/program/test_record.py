@@ -285,6 +285,7 @@ def test_failures_are_kept_only_on_request(mjsense):
     summary = json.loads(done.stdout)
     assert summary["kept"] == 0 and summary["failures"] == {"horizon reached: the object is not lifted": 3}
     assert "stopped after 3 attempts" in done.stderr
+    assert not [path for path in (mjsense.folder / "data").rglob("*") if path.is_file()]  # the model, without an episode, is removed
 
 
 def test_recording_contains_the_reason_of_a_failure(mjsense):
@@ -346,6 +347,9 @@ def test_resumed_recording_equals_an_uninterrupted_one(mjsense, signals):
         assert code == -signal.SIGKILL
     else:
         assert code == 1 and "Continue with --resume" in err
+        house = mjsense.folder / "data/house_0"
+        finished = [*house.glob("*.h5"), *house.glob(".recording/episode_????????")]
+        assert ("mjsense repair" in err) == bool(finished)  # which needs a finished episode
     mjsense(*args, "--worlds", 1, "--out", "data", "--resume", "-q")
     mjsense(*args, "--worlds", 4, "--out", "whole", "-q")
     assert contents(mjsense.folder / "data") == contents(mjsense.folder / "whole")

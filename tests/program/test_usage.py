@@ -181,7 +181,7 @@ def test_output_folder_that_cannot_be_created(mjsense):
 def test_folder_names_are_never_options_or_addresses(mjsense, name):
     """ffmpeg must not interpret any part of the folder's name as an option or a protocol."""
     mjsense("record", "pick", "--size", "32x24", "--horizon", 2, "--keep-failures", "-q", f"--out={name}")
-    assert "intact: 1 files, 1 episodes" in mjsense("verify", "--", name).stdout
+    assert "intact: 1 file, 1 episode, " in mjsense("verify", "--", name).stdout
     assert sorted(p.name for p in (mjsense.folder / name).iterdir()) == ["contact_sheet.png", "house_0"]
 
 

@@ -187,7 +187,7 @@ def test_a_recording_of_the_first_format(tmp_path):
     """Made by a version without data for replay, numbers and checksummed archives, whose videos have B-frames and no tuning."""
     with tarfile.open(Path(__file__).parent / "recordings/first_format.tar.xz") as archive:
         archive.extractall(tmp_path, filter="data")
-    for command, expected in (("verify", "intact: 1 files, 1 episodes, 3 observations, 2 videos"), ("inspect", "1 x horizon reached")):
+    for command, expected in (("verify", "intact: 1 file, 1 episode, 3 observations, 2 videos"), ("inspect", "1 x horizon reached")):
         done = run_program(command, tmp_path)
         assert done.returncode == 0 and expected in done.stdout, done.stdout + done.stderr
     dataset = mjs.Dataset(tmp_path)
@@ -259,6 +259,12 @@ def test_filters_and_names(root, dataset, tmp_path):
     assert len(mjs.Dataset(root, outcome=sorted(outcomes)).episodes) == 3
     assert len(mjs.Dataset(root, outcome="horizon reached*").episodes) == 3 and len(mjs.Dataset(root, outcome=lambda o: "lift" in o)) == 63
     assert len(mjs.Dataset(root, success=True)) == 0 and mjs.Dataset(root, success=True).stats() == {}
+    for outcome in ("horizon", ["horizon reached*", "horizon"]):  # a condition may match nothing, but a text is a name
+        with pytest.raises(ValueError, match=r"outcome: no episode has the outcome 'horizon'; .* has 3 x 'horizon reached"):
+            mjs.Dataset(root, outcome=outcome)
+    assert not mjs.Dataset(root, outcome=lambda text: text == "horizon").episodes
+    with pytest.raises(ValueError, match=r"houses: 3 is not in .*, which has the houses \[\d, 10\]"):
+        mjs.Dataset(root, houses=[10, 3])
     assert list(mjs.Dataset(root / "house_10", streams=["rewards"]).streams) == ["rewards"]
     assert set(mjs.Dataset(root, streams=["obs/sensor_data/*_depth"]).streams) == {
         f"obs/sensor_data/{c}_depth" for c in ("wrist_camera", "exo_camera_1")

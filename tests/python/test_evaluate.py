@@ -156,7 +156,8 @@ def test_an_evaluation_is_resumed_after_an_error_of_its_policy(tmp_path):
     with pytest.raises(RuntimeError, match="the network is gone") as raised:
         evaluate("pick", policy=Interrupted(), out=tmp_path / "b", **options)
     assert "resume the evaluation to play the others" in str(raised.value.__notes__)
-    with pytest.raises(ValueError, match="already contains") as again:
+    offered = "already contains an unfinished recording; resume it, overwrite it, or choose another directory"
+    with pytest.raises(ValueError, match=offered) as again:
         evaluate("pick", policy=Counting(), out=tmp_path / "b", **options)
     assert not hasattr(again.value, "__notes__")
     with pytest.raises(ValueError, match="policy"):  # its code is another one

@@ -71,5 +71,5 @@ def test_cpp_projects(tmp_path):
     header, pixels = (tmp_path / "front.ppm").read_bytes().split(b"255\n", 1)
     assert header == b"P6 320 240 " and len(pixels) == 3 * 320 * 240 and len(set(pixels)) > 100
     printed = run("records/records", "recording")
-    assert printed.startswith("2 episodes, ") and "intact: 1 files, 2 episodes" in printed
+    assert printed.startswith("2 episodes, ") and "intact: 1 file, 2 episodes" in printed
     assert len(list((tmp_path / "recording/house_0").glob("*.h5"))) == 1

@@ -89,7 +89,7 @@ def test_an_environment_plays_the_episodes_of_a_reset():
     env.reset(options={"episodes": [3], "reset_mask": np.array([True, False])})
     np.testing.assert_array_equal(env.sim.state[0], first[1])
     assert env.reset()[1]["episode_info"]["number"].tolist() == [0, 1]
-    for numbers, message in (([1], "has 1 numbers for 2 worlds"), ([1, -1], "must be ints from 0 on")):
+    for numbers, message in (([1], "has 1 number for 2 worlds"), ([1, -1], "must be ints from 0 on")):
         with pytest.raises(ValueError, match=message):
             env.reset(options={"episodes": numbers})
 

@@ -288,8 +288,13 @@ CASES = {
     "number of an observation": (lambda u: u.data[10**6], ["1000000", "out of range", "6 observations"]),
     "a name for a number": (lambda u: u.data["qpos"], ["Dataset.__getitem__()", "index must be an int", "'qpos'"]),
     "stream of a window": (lambda u: mjs.Dataset(u.data.root, delta_timestamps={"rewrds": [0]}), ["'rewrds'", "did you mean 'rewards'?"]),
+    "a number for a window": (
+        lambda u: mjs.Dataset(u.data.root, delta_timestamps={"rewards": 0.1}),
+        ["delta_timestamps['rewards'] is 0.1", "a list of numbers"],
+    ),
+    "memory for a cache": (lambda u: mjs.Dataset(u.data.root, cache_mb=-1), ["cache_mb is -1", "at least 0"]),
     "text for streams": (lambda u: mjs.Dataset(u.data.root, streams="rewards"), ["Dataset()", "streams must be a sequence of str", "'rewards'"]),
-    "number of an episode": (lambda u: mjs.Dataset(u.data.root, episodes=[7]), ["episodes: 7", "1 episodes"]),
+    "number of an episode": (lambda u: mjs.Dataset(u.data.root, episodes=[7]), ["episodes: 7", "has 1 episode"]),
     "key of a map": (lambda u: mjs.exporting.export_lerobot(u.data.root, u.tmp / "e", map={"stat": "obs/agent/qpos"}), ["map", "unknown key 'stat'", "state, action"]),
     "stream of a map": (
         lambda u: mjs.exporting.export_lerobot(u.data.root, u.tmp / "e", map={"state": "obs/agent/qps", "action": "obs/agent/qpos"}),

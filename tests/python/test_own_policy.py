@@ -226,7 +226,7 @@ def test_sensors_of_a_policy(tmp_path):
         ({"arm": np.zeros((3, 8))}, ValueError, r"returned 'arm' of shape \(3, 8\), expected \(3, 7\)"),
         ({"arms": np.zeros((3, 7))}, KeyError, "did you mean 'arm'"),
         ({"action": np.zeros((3, 8)), "done": True}, ValueError, r"'done' of shape \(1,\), expected \(3,\)"),
-        ({"arm": np.zeros((3, 2, 7)), "gripper": np.zeros((3, 1))}, ValueError, "has 1 steps, another group 2"),
+        ({"arm": np.zeros((3, 2, 7)), "gripper": np.zeros((3, 1))}, ValueError, "has 1 step, another group 2"),
         ("up", ValueError, None),
     ],
 )  # fmt: skip

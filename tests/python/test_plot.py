@@ -32,6 +32,8 @@ def test_names_of_streams():
     assert _expand(["arm"], known) == [known[1], known[3]]
     with pytest.raises(mjs.UnknownNameError, match="no stream 'tcp_pos'; did you mean 'obs/extra/tcp_pose'"):
         _expand(["tcp_pos"], known)
+    with pytest.raises(mjs.UnknownNameError, match=r"no stream 'qpos'; did you mean 'obs/agent/qpos'\?"):  # a group
+        _expand(["qpos"], known)
     with pytest.raises(mjs.UnknownNameError, match="there are obs/extra/tcp_pose, "):
         _expand(["zzz"], known)
 

@@ -46,6 +46,10 @@ def test_verify_says_nothing_of_a_recording_if_a_package_is_missing(tmp_path):
     (("record", "--config"), "mjsense: --config: the value is missing, FILE; see mjsense record --help"),
     (("replay",), "mjsense: replay: the argument 'path' is missing: A recording; see mjsense replay --help"),
     (("import",), "mjsense: import: the argument 'format' is missing: one of robomimic, lerobot; see mjsense import --help"),
+    (("scan", "x.xml"), "mjsense: scan: the option --frame is missing: The frame that carries the lidar: site:NAME, body:NAME, geom:NAME "
+     "or camera:NAME; see mjsense scan --help"),
+    (("assets", "install"), "mjsense: assets: the argument 'NAME' is missing: install: sources of objects, such as robosuite. convert: a "
+     ".glb, .gltf or .obj file, and the folder to make; see mjsense assets --help"),
     (("nothing",), "mjsense: no command 'nothing'; see mjsense --help"),
 ])  # fmt: skip
 def test_wrong_usage_is_described(words, message):

@@ -431,6 +431,9 @@ def test_errors(recorded, tmp_path):
     mjs.record("pick", out=tmp_path / "bare", replay=False, **RECORDING)
     with pytest.raises(ValueError, match="has no data for replay"):
         mjs.render(tmp_path / "bare", out)
+    # Only options that a rendering has are proposed.
+    with pytest.raises(ValueError, match="already contains recorded trajectories; resume it, or choose another directory"):
+        mjs.render(recorded, tmp_path / "bare")
 
 
 def test_program(recorded, tmp_path):
@@ -447,7 +450,7 @@ def test_program(recorded, tmp_path):
         "--episodes",
         0,
     )
-    assert done.returncode == 0 and done.stdout.startswith("1 episodes with 18 images in "), done.stdout + done.stderr
+    assert done.returncode == 0 and done.stdout.startswith("1 episode with 18 images in "), done.stdout + done.stderr
     assert mjs.Dataset(tmp_path / "out").episodes[0].video("top_depth").shape == (9, 24, 32)
     wrong = run("render", recorded, tmp_path / "out2", "--add-camera", "top=pos=0.5,0")
     assert wrong.returncode == 2 and wrong.stderr.startswith("mjsense: ") and wrong.stderr.count("\n") == 1

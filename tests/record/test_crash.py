@@ -65,6 +65,6 @@ def test_repair_completes_a_killed_recording(record_fake, tmp_path):
     (house / ".recording/episode_00000099.part.1").mkdir()
     assert "published 2 finished episodes" in record_fake("repair", tmp_path).stdout
     assert not (house / ".recording").exists()
-    assert "intact: 1 files, 2 episodes" in record_fake("verify", tmp_path).stdout
+    assert "intact: 1 file, 2 episodes" in record_fake("verify", tmp_path).stdout
     done = record_fake(tmp_path, *OPTIONS, check=False)
     assert done.returncode == 2 and "already contains recorded trajectories" in done.stderr

@@ -267,14 +267,14 @@ def peer_file(tmp_path):
 def test_molmospaces_files_are_understood(record_fake, peer_file):
     path, noise = peer_file
     done = record_fake("verify", path.parent)
-    assert "names no video of camera 'wrist_camera'" in done.stdout and "intact: 1 files, 1 episodes, 40 observations" in done.stdout
+    assert "names no video of camera 'wrist_camera'" in done.stdout and "intact: 1 file, 1 episode, 40 observations" in done.stdout
     listing = record_fake("inspect", path).stdout
     line = next(row for row in listing.splitlines() if "tcp_pose" in row)
     assert f"{noise.mean():.4g}" in line and f"{noise.std():.4g}" in line
-    assert "added 1 video names" in record_fake("repair", path.parent).stdout
+    assert "added 1 video name" in record_fake("repair", path.parent).stdout
     assert readers.validate(path) == [[]]
     assert record_fake("repair", path.parent).stdout == "nothing to repair\n"
-    assert "1 videos" in record_fake("verify", path.parent).stdout
+    assert "1 video\n" in record_fake("verify", path.parent).stdout
 
 
 # ---- detection of damage

@@ -15,6 +15,7 @@ from mjsense import _core
 from mjsense.cluster.driver import ClusterProgress, ClusterSummary, run_job
 from mjsense.cluster.job import Shard
 from mjsense.cluster.tasks import check_pickle
+from mjsense.core.counted import counted
 from mjsense.core.old_names import old_argument
 from mjsense.dataset import Dataset, render
 from mjsense.dataset.remote import absolute
@@ -95,7 +96,7 @@ def render_on_ray(
     count = len(Dataset(root).episodes)
     positions = tuple(range(count)) if episodes is None else tuple(episodes)
     if invalid := [i for i in positions if not 0 <= i < count]:
-        raise ValueError(f"episodes: {invalid[0]} is not in {root}, which has {count} episodes")
+        raise ValueError(f"episodes: {invalid[0]} is not in {root}, which has {counted(count, 'episode')}")
     job = _Rendering(absolute(root), absolute(out), positions, options)
     shards = [
         Shard(n, first, min(shard_episodes, len(positions) - first))

@@ -19,6 +19,7 @@ from mjsense import _core
 from mjsense.cluster.index import write_index
 from mjsense.cluster.job import ShardResult
 from mjsense.cluster.storage import Storage
+from mjsense.core.counted import counted
 from mjsense.core.optional import optional
 from mjsense.dataset import check
 from mjsense.dataset.files import INDEX, EpisodeEntry, entries_of, read_index
@@ -64,8 +65,10 @@ def _summary_text(about: dict[str, Any] | None) -> str:
     if about is None:
         return f"no {INDEX}: the recording is not complete; the following counts the files that are there\n"
     return (
-        f"{INDEX}  {about['episodes']} episodes, {about['successes']} successes, {about['observations']} observations, "
-        f"{about['instructions']} instructions in {about['files']} files; the following counts whole files\n"
+        f"{INDEX}  {counted(about['episodes'], 'episode')}, {counted(about['successes'], 'success')}, "
+        f"{counted(about['observations'], 'observation')}, "
+        f"{counted(about['instructions'], 'instruction')} in {counted(about['files'], 'file')}; "
+        "the following counts whole files\n"
     )
 
 
@@ -104,10 +107,11 @@ def verify_text(found: dict[str, Any]) -> str:
             lines.append(f"error: {f['place']} {f['text']}")
         elif same := notes.pop(f["text"], 0):
             lines.append(f"note: {f['place']} {f['text']}" + (f" (and {same - 1} more)" if same > 1 else ""))
-    counts = f"{found['files']} files, {found['episodes']} episodes, {found['steps']} observations, {found['videos']} videos"
-    counts += f", {found['unpublished']} episodes not published" if found["unpublished"] else ""
+    nouns = {"files": "file", "episodes": "episode", "steps": "observation", "videos": "video"}
+    counts = ", ".join(counted(found[name], noun) for name, noun in nouns.items())
+    counts += f", {counted(found['unpublished'], 'episode')} not published" if found["unpublished"] else ""
     counts += (
-        f"; {found['indexed']} episodes in {INDEX}"
+        f"; {counted(found['indexed'], 'episode')} in {INDEX}"
         if "indexed" in found
         else f"; no {INDEX}: the recording is not complete"
         if found.get("of_job")
@@ -194,5 +198,5 @@ def repair(path: str) -> dict[str, list[str]]:
     before = storage.read(INDEX)
     kept = write_index(storage, [done[n] for n in range(count)], limit)
     if storage.read(INDEX) != before:
-        made["actions"].append(f"{INDEX}: written with the {kept} episodes of {count} complete shards")
+        made["actions"].append(f"{INDEX}: written with the {counted(kept, 'episode')} of {count} complete shards")
     return made

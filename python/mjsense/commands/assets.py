@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import argparse
 
+from mjsense.core.counted import counted
+
 EXAMPLES = [
     ("mjsense assets install robosuite", "Install the objects of robosuite."),
     ("mjsense assets install robosuite libero", "Install the objects of both."),
@@ -42,5 +44,5 @@ def run(arguments: argparse.Namespace) -> int:
 
     for name in arguments.names:
         added = assets.install_objects(name)
-        print(f"{name}: {len(added)} objects added" + (": " + ", ".join(added) if added else ", all were there"))
+        print(f"{name}: {counted(len(added), 'object')} added" + (": " + ", ".join(added) if added else ", all were there"))
     return 0

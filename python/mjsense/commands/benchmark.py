@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 
 from mjsense.commands.parser import Parser, add_name, add_no_terminate, field_values
+from mjsense.core.counted import counted
 
 EXAMPLES = [
     (
@@ -57,9 +58,9 @@ def run(arguments: argparse.Namespace) -> int:
 
         count = export_molmospaces(arguments.task, options["out"])
         if not arguments.quiet:
-            print(f"{count} episodes in {options['out']}/benchmark.json")
+            print(f"{counted(count, 'episode')} in {options['out']}/benchmark.json")
         return 0
     found = create_benchmark(arguments.task, progress=False if arguments.quiet else None, **options)
     if not arguments.quiet:
-        print(f"{len(found.episodes)} episodes of {found.name} in {found.folder}, {found.checksum}")
+        print(f"{counted(len(found.episodes), 'episode')} of {found.name} in {found.folder}, {found.checksum}")
     return 0

@@ -125,7 +125,7 @@ class Parser(argparse.ArgumentParser):
     def _missing(self, action: argparse.Action) -> NoReturn:
         name = f"option {action.option_strings[-1]}" if action.option_strings else f"argument '{place_of(action)}'"
         words = ", ".join(map(str, action.choices or ()))
-        about = f"one of {words}" if words else (action.help or "").replace("%%", "%").split(". ")[0].rstrip(".")
+        about = f"one of {words}" if words else (action.help or "").replace("%%", "%").removesuffix(".")
         self.error(f"{self.name}: the {name} is missing: {about}")
 
     def _match_argument(self, action: argparse.Action, arg_strings_pattern: str) -> int:

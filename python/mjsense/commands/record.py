@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from mjsense.commands._ray import add_ray, ray_options
 from mjsense.commands.output import bytes_below, bytes_text, tell, tree
 from mjsense.commands.parser import Parser, add_name, field_values
+from mjsense.core.counted import counted
 from mjsense.exporting.formats import FORMATS
 
 if TYPE_CHECKING:
@@ -125,13 +126,15 @@ def _record(arguments: argparse.Namespace, options: dict[str, Any], *, sheet: bo
             print(f"\ncontact sheet, every camera over time ({shown}): {path}")
     for damage in made["work"]["damage"]:
         tell(f"mjsense: {damage}")
-    if made["interrupted"]:
+    if made["interrupted"] and not made["kept"]:
+        tell("interrupted: no episode is finished yet. Continue with --resume.")
+    elif made["interrupted"]:
         tell(
             "interrupted: the finished episodes are safe. Continue with --resume, or finish with `mjsense repair "
             f"{made['path']}`."
         )
     elif not made["enough"]:
-        tell(f"stopped after {made['succeeded'] + made['failed']} attempts; --max-attempts allows more")
+        tell(f"stopped after {counted(made['succeeded'] + made['failed'], 'attempt')}; --max-attempts allows more")
     return 0 if made["enough"] else 1
 
 
@@ -143,8 +146,8 @@ def _title(options: dict[str, Any]) -> tuple[str, str]:
     text = task
     if robot:
         text += f" with {robot}" + ("" if robot == options.get("robot") else " (the task's robot)")
-    count, word = (attempts, "attempt") if attempts else (options.get("episodes", 1), "episode")
-    return f"{text}{f' in {scene}' if scene else ''}: {count} {word}{'' if count == 1 else 's'} into {out}", str(out)
+    count = counted(attempts, "attempt") if attempts else counted(options.get("episodes", 1), "episode")
+    return f"{text}{f' in {scene}' if scene else ''}: {count} into {out}", str(out)
 
 
 def _time_split(made: dict[str, Any]) -> dict[str, float]:
@@ -165,7 +168,7 @@ def _summary_text(made: dict[str, Any]) -> str:
     if made["steps"]:
         rate = 1 / max(made["seconds"], 1e-9)
         lines.append(
-            f"{made['steps']} steps in {made['seconds']:.1f} s: {made['steps'] * rate:.1f} steps/s, "
+            f"{counted(made['steps'], 'step')} in {made['seconds']:.1f} s: {made['steps'] * rate:.1f} steps/s, "
             f"{made['physics_steps'] * rate:.0f} physics steps/s, {made['frames'] * rate:.1f} frames/s"
         )
         split = "".join(f"  {name} {100 * seconds * rate:.0f} %" for name, seconds in _time_split(made).items())

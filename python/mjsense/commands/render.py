@@ -8,6 +8,7 @@ from typing import Any
 
 from mjsense.commands._ray import add_ray, ray_options
 from mjsense.commands.parser import Parser, add_episodes, episodes_of, field_values
+from mjsense.core.counted import counted
 
 EXAMPLES = [
     (
@@ -105,7 +106,10 @@ def run(arguments: argparse.Namespace) -> int:
         **options,
     )
     if not arguments.quiet:
-        print(f"{made.finished} episodes with {made.frames} images in {made.seconds:.1f} s: {', '.join(map(str, made.paths))}")
+        print(
+            f"{counted(made.finished, 'episode')} with {counted(made.frames, 'image')} in {made.seconds:.1f} s: "
+            f"{', '.join(map(str, made.paths))}"
+        )
     return 0
 
 
@@ -121,5 +125,5 @@ def _on_ray(arguments: argparse.Namespace, options: dict[str, Any]) -> int:
         options["sensors"] = partial(sensors_of, arguments.sensors)
     made = render_on_ray(arguments.path, arguments.out, **options, **ray_options(arguments))
     if not arguments.quiet:
-        print(f"{made.kept} episodes in {made.seconds:.1f} s: {made.out}")
+        print(f"{counted(made.kept, 'episode')} in {made.seconds:.1f} s: {made.out}")
     return 0

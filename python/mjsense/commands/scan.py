@@ -24,7 +24,10 @@ _SKIPPED = ("rate_hz", "name", "any_frame", "debug_vis", "hit_ids", "motion_dist
 def add_arguments(parser: Parser) -> None:
     parser.add_argument("scene", metavar="SCENE.xml", help="An MJCF file, or embedded:FILE.")
     parser.add_argument(
-        "--frame", required=True, metavar="TYPE:NAME", help="The frame that carries the lidar: site:NAME, body:NAME, ..."
+        "--frame",
+        required=True,
+        metavar="TYPE:NAME",
+        help="The frame that carries the lidar: site:NAME, body:NAME, geom:NAME or camera:NAME.",
     )
     parser.add_argument("--out", required=True, metavar="FILE", help="Output file, .ply or .pcd.")
     parser.add_fields("TableScanCfg", skip=_SKIPPED)

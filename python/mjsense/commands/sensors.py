@@ -9,6 +9,7 @@ from typing import Any
 
 from mjsense.commands.output import table
 from mjsense.commands.parser import Parser, add_name, add_steps, field_values
+from mjsense.core.counted import counted
 
 EXAMPLES = [
     ("mjsense sensors embedded:robots/quadruped.xml", "List the sensors of a model that mjsense includes."),
@@ -75,7 +76,7 @@ def _table(streams: list[dict[str, Any]]) -> str:
         for s, cost in zip(streams, costs)
     ]
     total = sum(filter(None, costs))
-    rows.append([f"{len(streams)} streams", "", "", "", "", str(sum(s["bytes"] for s in streams)), _cost(total or None)])
+    rows.append([counted(len(streams), "stream"), "", "", "", "", str(sum(s["bytes"] for s in streams)), _cost(total or None)])
     return table(("name", "shape", "dtype", "unit", "frame", "bytes", "us/step"), rows, right=(5, 6))
 
 

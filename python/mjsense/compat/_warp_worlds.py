@@ -13,6 +13,7 @@ import warp as wp
 
 from mjsense import _core
 from mjsense.compat import _warp_rendering
+from mjsense.core.counted import counted
 from mjsense.core.mujoco_names import STATE
 from mjsense.sim import foreign_model
 
@@ -207,7 +208,8 @@ class Worlds:
             array = getattr(rc, name)
             if array.shape[0] != self._num_worlds or not array.device.is_cpu or (array.size and not array.is_contiguous):
                 raise ValueError(
-                    f"render(): {name} of the render context is for {array.shape[0]} worlds on {array.device}, and the data has "
+                    f"render(): {name} of the render context is for {counted(array.shape[0], 'world')} on "
+                    f"{array.device}, and the data has "
                     f"{self._num_worlds} on the CPU: make the context with nworld={self._num_worlds}"
                 )
         self._update()

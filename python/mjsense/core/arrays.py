@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mjsense.core.counted import counted
 from mjsense.core.sensor_data import SensorData
 
 
@@ -54,7 +55,7 @@ def ids_of_worlds(given: Any, count: int) -> np.ndarray:
     ids = on_host(given)
     if ids.dtype == bool:
         if ids.shape != (count,):
-            raise ValueError(f"world_ids: a mask of shape {ids.shape} for {count} worlds")
+            raise ValueError(f"world_ids: a mask of shape {ids.shape} for {counted(count, 'world')}")
         return np.flatnonzero(ids)
     if ids.size and not np.issubdtype(ids.dtype, np.integer):
         raise TypeError(f"world_ids must be integers or a mask, not {given!r}")

@@ -17,6 +17,7 @@ import numpy as np
 
 from mjsense.core import representations
 from mjsense.core.arguments import checked
+from mjsense.core.counted import counted
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.dataset import statistics
 from mjsense.dataset.episode import Episode
@@ -73,17 +74,29 @@ class Dataset:
     ) -> None:
         self.root, source = resolved(root)
         """The folder or file; of an address, its copy on this machine."""
+        if cache_mb < 0:
+            raise ValueError(f"Dataset(): cache_mb is {cache_mb:g}: must be at least 0")
         entries, recordings = entries_of(self.root, source)
         self._store = Store(recordings, int(cache_mb * 1e6))
         chosen = [Episode(entry, i, self._store) for i, entry in enumerate(entries)]
         if episodes is not None:
             chosen = [chosen[i] for i in _numbers(episodes, len(chosen), self.root)]
+        counts = Counter(entry.outcome for entry in entries)
+        common = ", ".join(f"{count} x {printable(text)!r}" for text, count in counts.most_common(10))
+        contents = f"{self.root} has {common or 'no episodes'}"
+        contents += ", ..." if len(counts) > 10 else ""
         if outcome is not None:
-            chosen = [episode for episode in chosen if _matches(episode.outcome, outcome)]
+            wanted = outcome if callable(outcome) else [outcome] if isinstance(outcome, str) else list(outcome)
+            for one in () if callable(wanted) else wanted:
+                if not any(_matches(text, [one]) for text in counts):
+                    raise ValueError(f"outcome: no episode has the outcome {one!r}; {contents}")
+            chosen = [episode for episode in chosen if _matches(episode.outcome, wanted)]
         if success is not None:
             chosen = [episode for episode in chosen if episode.success == success]
         if houses is not None:
-            numbers = set(houses)
+            numbers, known = set(houses), {entry.house for entry in entries if entry.house is not None}
+            if unknown := sorted(numbers - known):
+                raise ValueError(f"houses: {unknown[0]} is not in {self.root}, which has the houses {sorted(known)}")
             chosen = [episode for episode in chosen if episode.house in numbers]
         if where is not None:
             chosen = [episode for episode in chosen if where(episode)]
@@ -99,10 +112,7 @@ class Dataset:
         self._windows: dict[str, list[int]] = {}
         if not chosen:
             if delta_timestamps or streams:
-                raise ValueError(
-                    f"{self.root}: no episode matches; it has {len(entries)} episodes with the outcomes "
-                    f"{sorted({entry.outcome for entry in entries})}"
-                )
+                raise ValueError(f"{self.root}: no episode matches; {contents}")
             return
         self._fps = self._common_fps()
         self._choose_streams(None if streams is None else list(streams), delta_timestamps or {}, tolerance_s)
@@ -142,7 +152,7 @@ class Dataset:
         i = int(index)
         i = i + len(self) if i < 0 else i
         if not 0 <= i < len(self):
-            raise IndexError(f"index {index} is out of range: {self.root} has {len(self)} observations")
+            raise IndexError(f"index {index} is out of range: {self.root} has {counted(len(self), 'observation')}")
         episode, t = self._place(i)
         sample: dict[str, Any] = Sample()
         arrays = episode._load_recorded(self._arrays)
@@ -173,7 +183,7 @@ class Dataset:
 
     def __repr__(self) -> str:
         outcomes = Counter(episode.outcome for episode in self.episodes)
-        lines = [f"Dataset({str(self.root)!r}): {len(self.episodes)} episodes, {len(self)} observations"]
+        lines = [f"Dataset({str(self.root)!r}): {counted(len(self.episodes), 'episode')}, {counted(len(self), 'observation')}"]
         lines += [f"  {count} x {printable(outcome)}" for outcome, count in outcomes.most_common()]
         return "\n".join(lines + [f"  {stream}" for stream in self.streams.values()])
 
@@ -183,10 +193,14 @@ class Dataset:
         rows = [(count, outcome) for outcome, count in outcomes.most_common()]
         table = representations.grid(("episodes", "outcome"), rows)
         streams = [(s.name, s.dtype, list(s.shape), s.unit, s.frame, s.description) for s in self.streams.values()]
-        folded = {f"{len(streams)} streams": representations.grid(("stream", "dtype", "shape", "unit", "frame", ""), streams)}
+        folded = {
+            counted(len(streams), "stream"): representations.grid(("stream", "dtype", "shape", "unit", "frame", ""), streams)
+        }
         first = self.episodes[0]._film() if self.episodes else ""
         return representations.block(
-            f"data set {self.root}: {len(self.episodes)} episodes, {len(self)} observations", table + first, folded
+            f"data set {self.root}: {counted(len(self.episodes), 'episode')}, {counted(len(self), 'observation')}",
+            table + first,
+            folded,
         )
 
     def index_of(self, episode: int, frame: int = 0) -> int:
@@ -196,7 +210,7 @@ class Dataset:
         k = self._position[episode]
         length = self.episodes[k].length
         if not -length <= frame < length:
-            raise ValueError(f"frame {frame} is not in episode {episode}, which has {length} observations")
+            raise ValueError(f"frame {frame} is not in episode {episode}, which has {counted(length, 'observation')}")
         return self._ends[k] - length + frame % length
 
     def stats(self, streams: Iterable[str] | None = None, *, frames: int = 200) -> dict[str, dict[str, np.ndarray]]:
@@ -331,20 +345,20 @@ def _numbers(episodes: Iterable[int], count: int, root: Path) -> list[int]:
     array = np.asarray(list(episodes))
     if array.dtype == bool:
         if array.shape != (count,):
-            raise ValueError(f"episodes: a mask of {array.size}, but {root} has {count} episodes")
+            raise ValueError(f"episodes: a mask of {array.size}, but {root} has {counted(count, 'episode')}")
         return np.flatnonzero(array).tolist()
     if array.size and array.dtype.kind not in "iu":
         raise TypeError(f"episodes must be integers or a mask, not {episodes!r:.100}")
     for i in array.tolist():
         if not 0 <= i < count:
-            raise ValueError(f"episodes: {i} is not in {root}, which has {count} episodes")
+            raise ValueError(f"episodes: {i} is not in {root}, which has {counted(count, 'episode')}")
     return array.tolist()
 
 
-def _matches(outcome: str, wanted: str | Iterable[str] | Callable[[str], bool]) -> bool:
+def _matches(outcome: str, wanted: Sequence[str] | Callable[[str], bool]) -> bool:
     if callable(wanted):
         return bool(wanted(outcome))
-    return any(outcome == one or fnmatch.fnmatchcase(outcome, one) for one in ([wanted] if isinstance(wanted, str) else wanted))
+    return any(outcome == one or fnmatch.fnmatchcase(outcome, one) for one in wanted)
 
 
 class Sample(dict[str, Any]):
@@ -354,19 +368,26 @@ class Sample(dict[str, Any]):
         raise UnknownNameError(f"the observation has no '{name}'{did_you_mean(name, self, 'it has')}")
 
 
+def groups_of(streams: Iterable[str]) -> list[str]:
+    """The groups of these streams, such as ``obs/agent/qpos``."""
+    return sorted({"/".join(stream.split("/")[:n]) for stream in streams for n in range(1, stream.count("/") + 1)})
+
+
 def _expand(name: str, known: Mapping[str, Stream]) -> list[str]:
     """The streams that a name, a group or a pattern stands for."""
     if name in known:
         return [name]
     found = [stream for stream in known if stream.startswith(f"{name}/")] or fnmatch.filter(known, name)
     if not found:
-        groups = {"/".join(stream.split("/")[:n]) for stream in known for n in range(1, stream.count("/") + 1)}
-        raise UnknownNameError(f"No stream, group or pattern '{name}'{did_you_mean(name, [*known, *sorted(groups)])}")
+        raise UnknownNameError(f"No stream, group or pattern '{name}'{did_you_mean(name, [*known, *groups_of(known)])}")
     return found
 
 
 def _steps(name: str, seconds: Sequence[float], fps: Fraction, tolerance_s: float) -> list[int]:
-    steps = [round(float(s) * float(fps)) for s in seconds]
+    try:
+        steps = [round(float(s) * float(fps)) for s in seconds]
+    except (TypeError, ValueError, OverflowError):
+        raise TypeError(f"delta_timestamps['{name}'] is {seconds!r:.100}: must be a list of numbers, in seconds") from None
     off = [s for s, n in zip(seconds, steps) if abs(float(s) - n / float(fps)) > tolerance_s]
     if off:
         nearest = round(off[0] * float(fps)) or (1 if off[0] > 0 else -1)

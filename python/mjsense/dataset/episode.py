@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from mjsense.core.arguments import checked
+from mjsense.core.counted import counted
 from mjsense.dataset import playback
 from mjsense.dataset.episode_rows import EpisodeRows
 from mjsense.dataset.quality import EpisodeQuality, idle_steps, kept_rows, quality_of
@@ -53,7 +54,7 @@ class Episode(EpisodeRows):
     def set_state(self, model: mujoco.MjModel, data: mujoco.MjData, t: int) -> None:
         """Sets ``data`` to the state at observation ``t`` and computes everything that depends on it. Does not step."""
         if not -self.length <= t < self.length:
-            raise ValueError(f"t is {t}; episode {self.index} has {self.length} observations")
+            raise ValueError(f"t is {t}; episode {self.index} has {counted(self.length, 'observation')}")
         playback.set_state(model, data, self.states[t])
 
     def replay(

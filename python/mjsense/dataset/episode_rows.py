@@ -15,6 +15,7 @@ import numpy as np
 
 from mjsense.core import representations
 from mjsense.core.arguments import checked
+from mjsense.core.counted import counted
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.dataset import bounded_json, json_rows
 from mjsense.dataset.cache import Cache
@@ -160,7 +161,7 @@ class EpisodeRows:
         return self.length
 
     def __repr__(self) -> str:
-        return f"Episode({self.index}, {self.task!r}, {self.length} observations, {printable(self.outcome)!r})"
+        return f"Episode({self.index}, {self.task!r}, {counted(self.length, 'observation')}, {printable(self.outcome)!r})"
 
     def _repr_html_(self) -> str:
         """HTML for notebooks: the episode's attributes, and images of its start, middle and end."""

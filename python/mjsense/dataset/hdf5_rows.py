@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from mjsense import _core
+from mjsense.core.counted import counted
 from mjsense.core.optional import optional
 from mjsense.dataset import limits
 from mjsense.dataset.hdf5_values import Attributes, reading, string_class, text_of
@@ -55,7 +56,7 @@ class Rows:
         """All of it for ``[:]``, ``[...]`` and ``[()]``, or one or several rows."""
         if isinstance(key, (int, np.integer)):
             if not -len(self) <= key < len(self):
-                raise IndexError(f"{self.where} has {len(self)} rows, not {key}")
+                raise IndexError(f"{self.where} has {counted(len(self), 'row')}, not {key}")
             return self._read(int(key) % len(self), 1)[0]
         if key is Ellipsis or key == () or key == slice(None):
             return self.read()
@@ -106,7 +107,10 @@ class Rows:
     def rows_of(self, length: int) -> Rows:
         """This dataset, if it has so many rows."""
         if not self.shape or self.shape[0] != length:
-            raise ValueError(f"{self.where} has {self.shape[0] if self.shape else 0} rows; its episode has {length} observations")
+            raise ValueError(
+                f"{self.where} has {counted(self.shape[0] if self.shape else 0, 'row')}; its episode has "
+                f"{counted(length, 'observation')}"
+            )
         return self
 
     def _text(self) -> bytes:
@@ -148,7 +152,7 @@ class Rows:
             raise ValueError(f"has rows of {row} bytes, more than {limits.ROW_BYTES}")
         self.bytes = _product(self.shape) * self.dtype.itemsize
         if self.shape and self.shape[0] > limits.STEPS:
-            raise ValueError(f"has {self.shape[0]} rows, more than {limits.STEPS}")
+            raise ValueError(f"has {counted(self.shape[0], 'row')}, more than {limits.STEPS}")
         if layout == h5d.CHUNKED:
             self._chunk = tuple(properties.get_chunk())
             self._filters = [properties.get_filter(i)[0] for i in range(properties.get_nfilters())]

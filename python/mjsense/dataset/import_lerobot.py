@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from mjsense.core.arguments import checked
+from mjsense.core.counted import counted
 from mjsense.core.declared_fields import given_options
 from mjsense.core.new_output import new_output
 from mjsense.dataset import foreign_values as foreign
@@ -81,7 +82,7 @@ def import_lerobot(
     source = LeRobotReader(Path(root))
     wanted = sorted(source.episodes) if episodes is None else [int(i) for i in episodes]
     if wrong := [i for i in wanted if i not in source.episodes]:
-        raise ValueError(f"episodes: {wrong[0]} is not in {root}, which has {len(source.episodes)} episodes")
+        raise ValueError(f"episodes: {wrong[0]} is not in {root}, which has {counted(len(source.episodes), 'episode')}")
     if joints is not None and scene is None:
         raise ValueError("joints needs scene (--scene), the model that has them")
     wanted = _with_rows(source, wanted)

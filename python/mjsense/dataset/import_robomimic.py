@@ -17,6 +17,7 @@ import numpy as np
 
 from mjsense.core import libmujoco
 from mjsense.core.arguments import checked
+from mjsense.core.counted import counted
 from mjsense.core.declared_fields import given_options
 from mjsense.core.new_output import new_output
 from mjsense.dataset import bounded_json
@@ -200,7 +201,8 @@ class _Demonstration:
         for key, array in self.arrays.items():
             if len(array) != self.length:
                 raise ValueError(
-                    f"{self.about}: {key} has {len(array)} rows, and actions has {self.length}; expected the same number"
+                    f"{self.about}: {key} has {counted(len(array), 'row')}, and actions has {self.length}; expected "
+                    "the same number"
                 )
             if key in ("rewards", "dones") and array.ndim != 1 and array.shape != (self.length, 1):
                 raise ValueError(f"{self.about}: {key} has the shape {[*array.shape]}, expected [{self.length}]")
@@ -379,7 +381,9 @@ class _Writer:
                 )
             size = known[place][0].size
             if (here := int(np.prod(demo.arrays[place].shape[1:]))) != size:
-                raise ValueError(f"{demo.about}: {place} has {here} numbers in a row, and {size} in the first demonstration")
+                raise ValueError(
+                    f"{demo.about}: {place} has {counted(here, 'number')} in a row, and {size} in the first demonstration"
+                )
 
     def _states(self, demo: _Demonstration, model: mujoco.MjModel) -> np.ndarray:
         """MuJoCo's whole state at each observation."""
@@ -391,7 +395,8 @@ class _Writer:
         stored, size = demo.arrays["states"], 1 + model.nq + model.nv
         if stored.shape[1:] != (size,):
             raise ValueError(
-                f"{demo.about}: states have {int(np.prod(stored.shape[1:]))} numbers; time, qpos and qvel of its model are {size}"
+                f"{demo.about}: states have {counted(int(np.prod(stored.shape[1:])), 'number')}; time, qpos and qvel "
+                f"of its model are {size}"
             )
         states = _finite(stored[()], f"{demo.about}: states")
         data, result = mujoco.MjData(model), np.empty((len(states), place.shape[1]))

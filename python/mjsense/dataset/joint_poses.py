@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mjsense.core import libmujoco
+from mjsense.core.counted import counted
 from mjsense.core.errors import UnknownNameError
 from mjsense.core.input_files import read_text
 from mjsense.dataset import foreign_values as foreign
@@ -61,7 +62,7 @@ class JointPoses:
             if self.model.jnt_type[i] in scalar
         }
         if len(names) != size:
-            raise ValueError(f"joints names {len(names)} joints, but {STATE} has {size} numbers")
+            raise ValueError(f"joints names {counted(len(names), 'joint')}, but {STATE} has {counted(size, 'number')}")
         if unknown := [name for name in names if name and name not in known]:
             raise UnknownNameError(
                 f"{scene} has no hinge or slide joint '{unknown[0]}', the name of a number of {STATE}; joints "

@@ -12,6 +12,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from mjsense.core.counted import counted
 from mjsense.core.input_files import missing
 from mjsense.core.optional import optional
 from mjsense.dataset import bounded_json, parquet_footer
@@ -88,7 +89,7 @@ class LeRobotReader:
                 footer = parquet_footer.read(path, plain)
                 if footer.rows > foreign.MAX_ROWS or footer.values > _MAX_VALUES or footer.bytes > _MAX_TABLE:
                     raise ValueError(
-                        f"{path}: has {footer.rows} rows, {footer.values} values and {footer.bytes} bytes, "
+                        f"{path}: has {counted(footer.rows, 'row')}, {counted(footer.values, 'value')} and {footer.bytes} bytes, "
                         f"the limits are {foreign.MAX_ROWS}, {_MAX_VALUES} and {_MAX_TABLE}"
                     )
                 schema = self._tables.ParquetFile(arrow.PythonFile(plain, "r")).schema
@@ -154,7 +155,7 @@ class LeRobotReader:
         table = table.filter(_needs("pyarrow.compute").equal(table["episode_index"], index))
         length = episode["length"]
         if table.num_rows != length:
-            raise ValueError(f"{path}: has {table.num_rows} rows of episode {index}, whose length is {length}")
+            raise ValueError(f"{path}: has {counted(table.num_rows, 'row')} of episode {index}, whose length is {length}")
         found: dict[str, np.ndarray] = {}
         for key in wanted[:-2]:
             if key in table.column_names:
@@ -235,7 +236,9 @@ class LeRobotReader:
                         return
         except av.error.FFmpegError as error:
             raise ValueError(f"{path}: cannot be decoded: {' '.join(str(error).split())}") from None
-        raise ValueError(f"{self.root}: the video of {key} has {count} frames of episode {index}, whose length is {length}")
+        raise ValueError(
+            f"{self.root}: the video of {key} has {counted(count, 'frame')} of episode {index}, whose length is {length}"
+        )
 
 
 def _bytes_of(array: Any) -> int:
@@ -263,7 +266,7 @@ def _numbers(values: list[Any], dtype: str, shape: tuple[int, ...], place: str) 
                 continue
         except (TypeError, ValueError, OverflowError):
             pass
-        raise ValueError(f"{place}: row {t} is {foreign.found(value)}, expected {size} numbers of the type {dtype}")
+        raise ValueError(f"{place}: row {t} is {foreign.found(value)}, expected {counted(size, 'number')} of the type {dtype}")
     raise ValueError(f"{place}: the rows are not arrays of {[*shape]} numbers of the type {dtype}")
 
 

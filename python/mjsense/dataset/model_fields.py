@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense.core import libmujoco
+from mjsense.core.counted import counted
 from mjsense.core.mujoco_names import Joint
 from mjsense.scene.physics_options import PREFIX
 from mjsense.scene.randomizable import field_of, is_randomizable, valid_values
@@ -159,10 +160,10 @@ def read_input(group: Mapping[str, Any], name: str, length: int, about: str) -> 
         or shape[0] != rows
         or (name == "mocap" and shape[3] != 7)
     ):
-        expected = f"{dtype} with {dimensions} dimensions" + ("" if name == "held" else f" and {length} rows")
+        expected = f"{dtype} with {dimensions} dimensions" + ("" if name == "held" else f" and {counted(length, 'row')}")
         raise ValueError(f"{about}: replay/{name}: is {getattr(dataset, 'dtype', 'a group')} {shape}, expected {expected}")
     if (count := math.prod(shape)) > MAX_NUMBERS:
-        raise ValueError(f"{about}: replay/{name}: has {count} numbers, the limit is {MAX_NUMBERS}")
+        raise ValueError(f"{about}: replay/{name}: has {counted(count, 'number')}, the limit is {MAX_NUMBERS}")
     values = dataset[()]
     low, high = (np.fmin, np.fmax) if with_nan else (np.minimum, np.maximum)
     used = values[1:] if name in ("ctrl", "mocap") else values
@@ -189,7 +190,8 @@ def check_inputs(inputs: ReplayInputs, model: mujoco.MjModel, size: int, substep
     found = inputs.state.shape[1]
     if found != size:
         raise ValueError(
-            f"{about}: the recorded state has {found} numbers, that of MuJoCo {'.'.join(map(str, libmujoco.SERIES))} has {size}. "
+            f"{about}: the recorded state has {counted(found, 'number')}, that of MuJoCo "
+            f"{'.'.join(map(str, libmujoco.SERIES))} has {size}. "
             "Replay needs a MuJoCo of the series that recorded."
         )
     if inputs.written.shape != inputs.state.shape:

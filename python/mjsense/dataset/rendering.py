@@ -16,6 +16,7 @@ import numpy as np
 
 from mjsense import _core
 from mjsense.core.arguments import checked
+from mjsense.core.counted import counted
 from mjsense.core.declared_fields import declared_fields, given_options
 from mjsense.core.old_names import old_argument
 from mjsense.core.progress_line import line_of
@@ -27,6 +28,7 @@ from mjsense.dataset.hdf5 import open_h5
 from mjsense.dataset.places import read_plain
 from mjsense.dataset.playback import archive_of, inputs_of, where
 from mjsense.dataset.render_cameras import RenderCamera
+from mjsense.recording.existing import require_no_recording
 from mjsense.recording.ffmpeg import use_installed_ffmpeg
 from mjsense.recording.recorder import recorded_sensors
 from mjsense.sensors.core_sensors import CoreSensor
@@ -398,11 +400,14 @@ def render(
     given = () if callable(sensors) else list(sensors)
     if len(houses) > 1 and any(not hasattr(sensor, "kind") or isinstance(sensor, CoreSensor) for sensor in given):
         raise ValueError(
-            f"{dataset.root} has {len(houses)} houses: pass a function that makes the sensors, because each belongs "
+            f"{dataset.root} has {counted(len(houses), 'house')}: pass a function that makes the sensors, because each belongs "
             "to one simulation"
         )
     if Path(out).resolve() in {dataset.root.resolve(), *(chosen[0].path.resolve().parents[1] for chosen in houses)}:
         raise ValueError(f"the output directory '{out}' is that of the recording; choose another one")
+    if not resume:
+        for chosen in houses:
+            require_no_recording(Path(out) / f"house_{chosen[0].house or 0}", "resume it")
     state = _Progress(len(dataset.episodes), progress)
     paths = []
     for chosen in houses:

@@ -12,6 +12,7 @@ import numpy as np
 
 from mjsense.core import libmujoco
 from mjsense.core.arguments import checked
+from mjsense.core.counted import counted
 from mjsense.core.mujoco_names import Obj, id2name
 from mjsense.core.old_names import old_argument
 from mjsense.core.progress_line import counter
@@ -90,7 +91,7 @@ class ReplayReport:
 
     def __repr__(self) -> str:
         equal, steps = sum(e.ok for e in self.episodes), sum(e.steps for e in self.episodes)
-        lines = [f"{equal} of {len(self.episodes)} episodes ({steps} steps) replay equal bit for bit"]
+        lines = [f"{equal} of {len(self.episodes)} episodes ({counted(steps, 'step')}) replay equal bit for bit"]
         checks = [e.sensors for e in self.episodes if e.sensors]
         if checks:
             streams = {name for check in checks for name in (*check.equal, *(found.field for found in check.deviations))}

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from mjsense.core.arguments import checked
+from mjsense.core.counted import counted
 from mjsense.dataset.cache import Cache
 from mjsense.dataset.places import open_plain
 from mjsense.dataset.video_decoder import Decoder, Packets, check_sum, have_av, to_array
@@ -101,7 +102,8 @@ class _Job:
 
 def _no_frame(info: VideoInfo, index: int) -> Exception:
     return RuntimeError(
-        f"{info.path} has no frame {index}; its episode has {info.frames} observations (`mjsense verify` checks the files)"
+        f"{info.path} has no frame {index}; its episode has {counted(info.frames, 'observation')} (`mjsense verify` "
+        "checks the files)"
     )
 
 
@@ -238,7 +240,7 @@ class Video:
             return frames
         t = index + len(self) if index < 0 else index
         if not 0 <= t < len(self):
-            raise IndexError(f"{self._info.path} has {len(self)} frames, not {index}")
+            raise IndexError(f"{self._info.path} has {counted(len(self), 'frame')}, not {index}")
         return self._reader.frame(self._info, self._kept[int(t)])
 
     def __repr__(self) -> str:

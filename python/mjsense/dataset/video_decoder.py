@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from mjsense.core.counted import counted
 from mjsense.core.optional import optional
 from mjsense.dataset.places import PlainFile, open_plain, printable
 
@@ -122,7 +123,9 @@ class Packets:
                 if not packet.size or packet.pts is None or packet.pos is None or stream.time_base is None:
                     continue  # the end of the stream
                 if len(self.sizes) > 2 * frames:
-                    raise RuntimeError(f"{path}: has more than {2 * frames} frames; its episode has {frames} observations")
+                    raise RuntimeError(
+                        f"{path}: has more than {2 * frames} frames; its episode has {counted(frames, 'observation')}"
+                    )
                 # The position is that of the packet's bytes in MP4, and a few bytes before them in Matroska.
                 file.seek(max(0, packet.pos))
                 offset = file.read(packet.size + _NEAR).find(bytes(packet))

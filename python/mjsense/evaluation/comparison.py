@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from mjsense.core.arguments import checked
+from mjsense.core.counted import counted
 from mjsense.core.errors import printable
 from mjsense.dataset import Dataset, Episode
 from mjsense.evaluation.facts import evaluation_of, settings_of
@@ -81,7 +82,7 @@ class Comparison:
             f"only A succeeds in {self.only_a}, only B in {self.only_b} of {len(self.pairs)} episodes; McNemar's "
             f"exact test: p = {self.p_value:.3g}",
         ]
-        lines += [f"{self.left_out} episodes that only one of them has played are left out"] if self.left_out else []
+        lines += [f"left out: {counted(self.left_out, 'episode')} that only one of them has played"] if self.left_out else []
         needed = ", ".join(f"{self.episodes_needed(one)} ({one:.0%})" for one in _NEEDED)
         lines.append(f"episodes that show a difference with a probability of 80 %: {needed}")
         return printable("\n".join(lines))

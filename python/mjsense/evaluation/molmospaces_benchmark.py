@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from mjsense import _core
+from mjsense.core.counted import counted
 from mjsense.core.errors import printable
 from mjsense.dataset.places import open_plain
 from mjsense.evaluation.benchmarks import DEFAULTS
@@ -127,7 +128,7 @@ def houses_of(episodes: list[Any]) -> str:
         if isinstance(name, str) and isinstance(split, str) and type(house) is int:
             houses.setdefault(printable(f"{name:.60} ({split:.20})"), set()).add(house)
     texts = [f"{_first(map(str, sorted(numbers)), ', ')} of {name}" for name, numbers in sorted(houses.items())]
-    return f"{len(episodes)} episodes in the houses {_first(texts, '; ') or 'that it does not state'}"
+    return f"{counted(len(episodes), 'episode')} in the houses {_first(texts, '; ') or 'that it does not state'}"
 
 
 def _first(texts: Iterable[str], comma: str) -> str:

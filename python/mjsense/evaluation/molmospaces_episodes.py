@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mjsense.core.counted import counted
 from mjsense.core.errors import did_you_mean
 from mjsense.dataset import bounded_json
 from mjsense.dataset.places import printable, read_plain
@@ -310,7 +311,7 @@ class _Reader:
     def numbers(self, key: str, count: int | None = None) -> list[float]:
         value = self.table.get(key)
         if not isinstance(value, list) or (len(value) != count if count is not None else len(value) > _MAX_JOINTS):
-            wanted = f"{count} numbers" if count is not None else f"at most {_MAX_JOINTS} numbers"
+            wanted = counted(count, "number") if count is not None else f"at most {_MAX_JOINTS} numbers"
             raise ValueError(f"{self.place}: {printable(key[:_NAME])} is {bounded_json.kind_of(value)}; expected {wanted}")
         return [_finite(one, f"{self.place}: {printable(key[:_NAME])}") for one in value]
 

@@ -20,6 +20,7 @@ from mjsense.evaluation.policies import policy_from
 from mjsense.evaluation.replayed import ReplayedPolicy
 from mjsense.evaluation.report import Results, require_parquet, results
 from mjsense.evaluation.timing import Latency, timed
+from mjsense.recording.existing import require_no_recording
 from mjsense.tasks.code_checksums import checksums
 from mjsense.tasks.parts import Robots, Scenes, Tasks
 from mjsense.tasks.policy import Policy
@@ -229,6 +230,9 @@ def play(
     made = policy_from(policy, **(policy_options or {}))
     noise = False
     jobs = _jobs(benchmark, options, ray)
+    if ray is None and not options.get("resume") and not options.get("overwrite"):
+        for job, _ in jobs:
+            require_no_recording(out / f"house_{job.get('house', 0)}", "resume it", "overwrite it")
     numbers = [number for job, played in jobs for number in (range(played) if isinstance(played, int) else played)]
     if isinstance(made, ReplayedPolicy):
         if len(jobs) > 1:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mjsense.core.counted import counted
 from mjsense.dataset import Dataset
 from mjsense.dataset.episode import Episode
 from mjsense.tasks.policy import Policy
@@ -77,7 +78,7 @@ class ReplayedPolicy(Policy):
     def _contents(self) -> str:
         seeds = sorted({str(seed) for seed, _ in self.episodes})
         numbers = sorted(number for _, number in self.episodes)
-        return f"it has {len(numbers)} episodes between {numbers[0]} and {numbers[-1]}, of seed {', '.join(seeds[:5])}"
+        return f"it has {counted(len(numbers), 'episode')} between {numbers[0]} and {numbers[-1]}, of seed {', '.join(seeds[:5])}"
 
     def act(self, obs: dict[str, Any]) -> dict[str, np.ndarray]:
         actions = np.zeros((self.num_worlds, len(self.action_low)))

@@ -97,7 +97,7 @@ def format_of(name: str) -> Format:
     if name not in FORMATS:
         from mjsense.core.errors import did_you_mean  # slow to import
 
-        raise ValueError(f"unknown export format '{name}'{did_you_mean(name, FORMATS)}; the formats are {', '.join(FORMATS)}")
+        raise ValueError(f"unknown export format '{name}'{did_you_mean(name, FORMATS, 'the formats are')}")
     return FORMATS[name]
 
 

@@ -7,6 +7,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from mjsense.core.counted import counted
 from mjsense.dataset.video_decoder import CODECS, open_container
 from mjsense.exporting.output import needs
 
@@ -51,7 +52,8 @@ class Concatenation:
             packets = [packet for packet in video.demux(stream) if packet.dts is not None]
             if len(packets) != frames:
                 raise ValueError(
-                    f"{path} has {len(packets)} frames, but its episode has {frames} observations; `mjsense verify` "
+                    f"{path} has {counted(len(packets), 'frame')}, but its episode has "
+                    f"{counted(frames, 'observation')}; `mjsense verify` "
                     "checks the files"
                 )
             tick = 1 / (fps * stream.time_base)  # of one frame

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from mjsense.core.counted import counted
 from mjsense.core.png import png_of
 from mjsense.dataset import Episode
 from mjsense.exporting.images import FLAGS, depth_unit, depth_videos, to_uint16
@@ -73,7 +74,8 @@ def _write_data_set(source: Source, records: Iterable[bytes], path: Path) -> Non
         "shardLengths": [str(len(shard)) for shard in shards],
         "numBytes": str(sum(sum(shard) for shard in shards)),
     }
-    about = f"{len(source)} episodes of the robot {source.robot} at {source.fps} observations per second, recorded with mjsense."
+    count = counted(len(source), "episode")
+    about = f"{count} of the robot {source.robot} at {source.fps} observations per second, recorded with mjsense."
     info = {"name": name, "version": _VERSION, "description": about, "fileFormat": "tfrecord", "splits": [split]}
     (folder / "dataset_info.json").write_text(json.dumps(info, indent=2))
     (folder / "features.json").write_text(json.dumps(_features(source), indent=2))

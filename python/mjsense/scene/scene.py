@@ -15,6 +15,7 @@ import numpy as np
 from mjsense import _core
 from mjsense.core import mujoco_names, mujoco_views, representations
 from mjsense.core.arguments import KnownAttributes, checked
+from mjsense.core.counted import counted
 from mjsense.core.errors import UnknownNameError
 from mjsense.scene.read_only_model import read_only
 from mjsense.sensors.configs import MujocoCfg, SceneCfg, SensorCfg
@@ -56,7 +57,7 @@ class Entity(KnownAttributes):
         self._complete = True
 
     def __repr__(self) -> str:
-        return f"<entity '{self.name}': {len(self.body_names)} bodies, {len(self.joint_names)} joints>"
+        return f"<entity '{self.name}': {counted(len(self.body_names), 'body')}, {counted(len(self.joint_names), 'joint')}>"
 
     def _repr_html_(self) -> str:
         """HTML for notebooks: the names of its elements."""
@@ -158,7 +159,7 @@ class Scene(KnownAttributes):
         raise TypeError(f"sensors: neither a sensor configuration nor a mjsense.Sensor: {sensor!r}")
 
     def __repr__(self) -> str:
-        return f"<scene: entities {list(self.entities)}, {len(self._sensors)} sensors>"
+        return f"<scene: entities {list(self.entities)}, {counted(len(self._sensors), 'sensor')}>"
 
     def __getitem__(self, key: str) -> Any:
         if key in self._sensors:
@@ -223,7 +224,7 @@ class Scene(KnownAttributes):
         for sensor in self._sensors.values():
             (configured if isinstance(sensor, Sensor) or sensor.cfg is not None else found).append(sensor._repr_html_())
         return representations.block(
-            repr(self), "".join(configured), {f"{len(found)} sensors of the models": "".join(found)} if found else None
+            repr(self), "".join(configured), {f"{counted(len(found), 'sensor')} of the models": "".join(found)} if found else None
         )
 
     @property

@@ -16,6 +16,7 @@ import numpy as np
 from mjsense import _core
 from mjsense.core import representations
 from mjsense.core.arrays import fresh
+from mjsense.core.counted import counted
 from mjsense.sensors.calls import Calls, EachWorld, Values, calls_of
 from mjsense.sensors.drawing import DebugShapes
 from mjsense.sensors.row_declarations import Row, leaves, nested, rows_of_space, rows_of_value
@@ -294,7 +295,7 @@ class Sensor(Generic[T]):
 
     def _mjs_put_dicts(self, world_ids: list[int], of: list[int], values: list[Any]) -> list[tuple[int, SensorError]]:
         if len(values) != len(of):
-            raise ValueError(f"{len(values)} values for {len(of)} worlds")
+            raise ValueError(f"{counted(len(values), 'value')} for {counted(len(of), 'world')}")
         faults = []
         for world in world_ids:
             try:

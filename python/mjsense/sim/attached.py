@@ -11,6 +11,7 @@ import numpy as np
 
 from mjsense import _core
 from mjsense.core.arguments import KnownAttributes, Seed, checked
+from mjsense.core.counted import counted
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.core.mujoco_names import STATE
 from mjsense.core.one_thread import OneThread, guarded
@@ -61,7 +62,7 @@ class Attached(KnownAttributes):
         given = model if isinstance(model, (list, tuple)) else [model] * len(self.datas)
         if len(given) != len(self.datas):
             raise ValueError(
-                f"attach(): got {len(given)} models for {len(self.datas)} data: pass one model, or one for each data"
+                f"attach(): got {counted(len(given), 'model')} for {len(self.datas)} data: pass one model, or one for each data"
             )
         self.models: tuple[Any, ...] = tuple(getattr(one, "_model", one) for one in given)
         """The user's model of each world."""
@@ -99,7 +100,7 @@ class Attached(KnownAttributes):
             found, expected = np.size(getattr(data, name)), columns.stop - columns.start
             if found != expected:
                 raise ValueError(
-                    f"{what} belongs to another model: its {name} has {found} numbers, and this model's has {expected}"
+                    f"{what} belongs to another model: its {name} has {counted(found, 'number')}, and this model's has {expected}"
                 )
         for name, size, kind in _ELEMENTS:
             found, expected = len(getattr(data, name)), getattr(self.models[0], size)
@@ -109,7 +110,7 @@ class Attached(KnownAttributes):
     def __repr__(self) -> str:
         if self._sim._core.closed:
             return "<attached sensors, closed>"
-        return f"<attached sensors {list(self._sim.scene.sensors)}, {self.num_worlds} worlds>"
+        return f"<attached sensors {list(self._sim.scene.sensors)}, {counted(self.num_worlds, 'world')}>"
 
     def __reduce__(self) -> Any:
         raise TypeError("attached sensors cannot be copied or pickled: attach to the copy of the model and data")

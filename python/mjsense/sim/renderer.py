@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mjsense.core.arguments import OutputArray, checked
+from mjsense.core.counted import counted
 from mjsense.core.errors import nearest
 from mjsense.core.one_thread import OneThread, guarded
 from mjsense.sim.scene_drawer import SceneDrawer
@@ -411,7 +412,7 @@ class Renderer:
                 raise TypeError(f"Renderer.render_batch(): datas[{index}] must be a mujoco.MjData, not {data!r:.100}")
         each = list(cameras) if isinstance(cameras, (list, tuple, np.ndarray)) else [cameras] * len(datas)
         if len(each) != len(datas):
-            raise ValueError(f"Renderer.render_batch: got {len(each)} cameras for {len(datas)} datas")
+            raise ValueError(f"Renderer.render_batch: got {counted(len(each), 'camera')} for {len(datas)} datas")
         shape = (len(datas), self._height, self._width, 3)
         images = np.empty(shape, np.uint8) if out is None else out
         if images.shape != shape or images.dtype != np.uint8 or not images.flags.c_contiguous or not images.flags.writeable:

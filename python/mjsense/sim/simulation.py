@@ -15,6 +15,7 @@ from mjsense import _core
 from mjsense.core import mujoco_names, representations
 from mjsense.core.arguments import KnownAttributes, Seed, checked
 from mjsense.core.arrays import ids_of_worlds
+from mjsense.core.counted import counted
 from mjsense.core.errors import UnknownNameError, did_you_mean
 from mjsense.core.later_rooms import provided
 from mjsense.scene.physics_options import Options
@@ -164,7 +165,7 @@ class Simulation(KnownAttributes, metaclass=ABCMeta):  # WarpSimulation is regis
     def __repr__(self) -> str:
         if self._core.closed:
             return "<simulation, closed>"
-        return f"<simulation: {self.num_worlds} worlds of {self.scene!r}, {self.step_dt:g} s a step>"
+        return f"<simulation: {counted(self.num_worlds, 'world')} of {self.scene!r}, {self.step_dt:g} s a step>"
 
     def _repr_html_(self) -> str:
         """HTML for notebooks: the worlds, user-defined sensors, and the scene, folded."""
@@ -178,7 +179,7 @@ class Simulation(KnownAttributes, metaclass=ABCMeta):  # WarpSimulation is regis
             ("seed", self.seed),
         ]
         facts += [
-            (f"{name} (MuJoCo's warning)", f"{counts.sum()} times, in {np.count_nonzero(counts)} worlds")
+            (f"{name} (MuJoCo's warning)", f"{counts.sum()} times, in {counted(int(np.count_nonzero(counts)), 'world')}")
             for name, counts in self.warning_counts.items()
         ]
         own = "".join(sensor._repr_html_() for sensor in self._python)

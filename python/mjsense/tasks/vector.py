@@ -15,6 +15,7 @@ from gymnasium.vector.utils import batch_space
 from mjsense import _core
 from mjsense.core import mujoco_names
 from mjsense.core.arguments import checked
+from mjsense.core.counted import counted
 from mjsense.core.errors import did_you_mean
 from mjsense.core.installed_files import use_installed_meshes
 from mjsense.scene.scene import Scene
@@ -201,7 +202,7 @@ class TaskVectorEnv(VectorEnv):
         if self._episodes is not None:
             raise ValueError("reset(): options['episodes'] is given, but the environment was made with episodes of its own")
         if len(numbers) != count:
-            raise ValueError(f"reset(): options['episodes'] has {len(numbers)} numbers for {count} worlds")
+            raise ValueError(f"reset(): options['episodes'] has {counted(len(numbers), 'number')} for {counted(count, 'world')}")
         return numbers
 
     def _begin(self, worlds: np.ndarray, given: list[int] | None = None) -> None:

@@ -17,6 +17,7 @@ from mjsense.core.new_output import expect_folder
 from mjsense.core.optional import optional
 from mjsense.core.representations import coloured
 from mjsense.dataset import Dataset, Episode
+from mjsense.dataset.dataset import groups_of
 from mjsense.viewer.curves import COLOURS, MAX_CURVES
 from mjsense.viewer.open import source_of
 from mjsense.viewer.source import LiveSource
@@ -101,7 +102,7 @@ def _expand(names: Iterable[str], known: Iterable[str]) -> list[str]:
         chosen = [one for one in known if one == name] or [one for one in known if one.endswith(f"/{name}")]
         chosen = chosen or [one for one in known if fnmatch.fnmatchcase(one, name) or one.startswith(f"{name}/")]
         if not chosen:
-            raise UnknownNameError(f"no stream '{name}'{did_you_mean(name, known, 'there are')}")
+            raise UnknownNameError(f"no stream '{name}'{did_you_mean(name, [*known, *groups_of(known)], 'there are')}")
         found += [one for one in chosen if one not in found]
     return found
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mjsense.core.counted import counted
 from mjsense.core.representations import plain
 from mjsense.dataset import Dataset, Episode
 from mjsense.dataset.streams import VIDEOS
@@ -141,7 +142,7 @@ class RecordingViewer(Viewer):
         if missing and self._shown < 0:
             print(plain(missing, 1000), flush=True)
         self._about.content = panel_text(
-            episode.task, f"{episode.outcome}, {episode.length} observations, seed {episode.seed}", missing
+            episode.task, f"{episode.outcome}, {counted(episode.length, 'observation')}, seed {episode.seed}", missing
         )
         self._time.max = max(episode.length - 1, 1)
         self._time.value = 0

@@ -14,6 +14,7 @@ import warp as wp
 from mjsense.core import mujoco_names
 from mjsense.core.arguments import KnownAttributes, Seed, checked
 from mjsense.core.arrays import ids_of_worlds, on_host
+from mjsense.core.counted import counted
 from mjsense.core.errors import did_you_mean
 from mjsense.scene.physics_options import PREFIX
 from mjsense.scene.randomizable import check_randomizable, valid_values
@@ -422,7 +423,7 @@ class WarpSimulation(KnownAttributes):
     def __repr__(self) -> str:
         if self._closed:
             return "<simulation, closed>"
-        return f"<simulation: {self.num_worlds} worlds of {self.scene!r} on {self.device}, {self.step_dt:g} s a step>"
+        return f"<simulation: {counted(self.num_worlds, 'world')} of {self.scene!r} on {self.device}, {self.step_dt:g} s a step>"
 
     def __getattr__(self, name: str) -> Any:
         if name[0] != "_" and hasattr(type(self._compiled), name):

@@ -9,6 +9,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/system/print_stderr.h"
+#include "mjsense/core/text/counted.h"
 
 namespace mjsense::effects {
 
@@ -24,8 +25,8 @@ void Scale::apply(const EffectTime& /*moment*/, const EffectRow& row) {
 void Misalignment::initialize(const EffectInit& init) {
   check_numeric(init);
   if (init.size % 3 != 0) {
-    throw ValueError(fmt::format("{}: the row must consist of 3-vectors; it has {} values",
-                                 init.context, init.size));
+    throw ValueError(fmt::format("{}: the row must consist of 3-vectors; it has {}", init.context,
+                                 counted(init.size, "value")));
   }
   stream_ = init.stream;
   matrix_.assign(static_cast<std::size_t>(init.num_worlds) * 9, 0.0);

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/record/encoder_pool.h"
 #include "mjsense/record/process.h"
 #include "mjsense/record/spawn.h"
@@ -62,14 +63,14 @@ void check_ffmpeg(const VideoCfg& cfg, std::span<const VideoStream> videos) {
                            .system = {.cpu_s = 60, .memory = std::uint64_t{4} << 30},
                            .max_bytes = 1 << 24});
   } catch (const CannotStart& error) {
-    throw RuntimeError(fmt::format(
-        "recording {} video streams needs ffmpeg: {}; install it (apt-get install ffmpeg, or for "
-        "Python pip install 'mjsense[video]') or set $MJSENSE_FFMPEG to its path",
-        videos.size(), error.what()));
+    throw RuntimeError(
+        fmt::format("recording {} needs ffmpeg: {}; install it (apt-get install ffmpeg, or for "
+                    "Python pip install 'mjsense[video]') or set $MJSENSE_FFMPEG to its path",
+                    counted(videos.size(), "video stream"), error.what()));
   } catch (const Error& error) {
-    throw RuntimeError(fmt::format(
-        "recording {} video streams needs ffmpeg, but '{}' did not list its encoders: {}",
-        videos.size(), program, error.what()));
+    throw RuntimeError(
+        fmt::format("recording {} needs ffmpeg, but '{}' did not list its encoders: {}",
+                    counted(videos.size(), "video stream"), program, error.what()));
   }
   constexpr const char* kEncoders[] = {"libx264", "ffv1", "libx264rgb"};
   for (const VideoStream& video : videos) {

@@ -3,6 +3,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/regular_file.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/recorder_impl.h"
 #include "mjsense/record/video_file.h"
@@ -113,7 +114,8 @@ std::vector<EpisodeFile::VideoSum> Recorder::Impl::check_videos(const Episode& e
                            printable(facts.codec), facts.container, video.codec(),
                            video.container()));
       if (facts.frames != episode.rows)
-        refuse(fmt::format("'{}' has {} frames, expected {}", name, facts.frames, episode.rows));
+        refuse(fmt::format("'{}' has {}, expected {}", name, counted(facts.frames, "frame"),
+                           episode.rows));
       if (!fits(facts.width, video.width) || !fits(facts.height, video.height))
         refuse(fmt::format("'{}' is {} x {} pixels, expected {} x {}", name, facts.width,
                            facts.height, video.width, video.height));

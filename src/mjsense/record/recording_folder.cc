@@ -305,6 +305,7 @@ void RecordingFolder::publish_all() {
     if (!published_.contains(b)) publish(b, episodes, true);
   }
   require_in_place();
+  if (kept.empty() && !stored_.empty()) dir_.remove(stored_);  // no episode refers to it
   mark_ending();
   end_or_throw();
 }

@@ -10,6 +10,7 @@
 #include <numeric>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/record/model_checksums.h"
 #include "mjsense/record/molmospaces.h"
 #include "mjsense/record/recording_description.h"
@@ -229,9 +230,9 @@ RecordingPlan plan_recording(const RecordingCfg& cfg) {
     };
     for (const Field& field : sensor->fields()) {
       if (field.data.shape().rank() == 0 || field.data.shape()[0] < cfg.num_worlds) {
-        throw ValueError(
-            fmt::format("sensor '{}': stream '{}' has shape {}, expected rows of {} worlds",
-                        sensor->name(), field.spec.name, field.data.shape().str(), cfg.num_worlds));
+        throw ValueError(fmt::format("sensor '{}': stream '{}' has shape {}, expected rows of {}",
+                                     sensor->name(), field.spec.name, field.data.shape().str(),
+                                     counted(cfg.num_worlds, "world")));
       }
     }
     if (const auto text = text_of(*sensor)) {

@@ -8,6 +8,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/core/system/os.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/hdf5/chunk_checks.h"
 #include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/checksum.h"
@@ -93,7 +94,7 @@ void check_staged_video(const Folder& folder, const StagedVideo& video, std::int
     throw RuntimeError(fmt::format("'{}' is not a complete video: {}", video.name, facts.error));
   if (facts.frames != steps)
     throw RuntimeError(
-        fmt::format("'{}' has {} frames, expected {}", video.name, facts.frames, steps));
+        fmt::format("'{}' has {}, expected {}", video.name, counted(facts.frames, "frame"), steps));
   if (!video.crc.empty() && checksum_of(file.get()) != video.crc)
     throw RuntimeError(fmt::format("'{}' is damaged: its checksum is wrong", video.name));
 }

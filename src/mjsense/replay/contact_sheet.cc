@@ -10,6 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/png.h"
 #include "mjsense/core/files/regular_file.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/depth_encoding.h"
 #include "mjsense/record/video_file.h"
@@ -137,7 +138,7 @@ std::vector<Strip> find_strips(const fs::path& path, int shown, const std::strin
       strip.height = facts.height;
       strip.frames = static_cast<int>(std::min<std::int64_t>(facts.frames, kMaxFrames));
       strip.episode = fmt::format("{}  {}  {}", recorded.name, trajectory, told);
-      strip.camera = fmt::format("{}, {} frames", key, strip.frames);
+      strip.camera = fmt::format("{}, {}", key, counted(strip.frames, "frame"));
       strips.push_back(std::move(strip));
     }
   }

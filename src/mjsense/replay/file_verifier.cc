@@ -10,6 +10,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/regular_file.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/recording_description.h"
@@ -175,8 +176,8 @@ class FileVerifier {
     const bool every_step =
         !name.starts_with("replay/model/") && name != "replay/held" && name != "replay/changed";
     if (every_step && (dataset.scalar() || dataset.rows() != T)) {
-      return error(context, fmt::format("has {} rows, expected {}",
-                                        dataset.scalar() ? 0 : dataset.rows(), T));
+      return error(context, fmt::format("has {}, expected {}",
+                                        counted(dataset.scalar() ? 0 : dataset.rows(), "row"), T));
     }
     if (dataset.is_json()) {
       int bad = 0;

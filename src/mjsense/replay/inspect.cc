@@ -12,6 +12,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/regular_file.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/outcome_details.h"
 #include "mjsense/record/recorded_house.h"
@@ -268,13 +269,14 @@ InspectResult inspect(const fs::path& path) {
 std::string InspectResult::text() const {
   std::string out;
   for (const File& f : files) {
-    out += fmt::format("{}  {}, {} episodes, {} successes, {} observations\n", f.path,
-                       size_text(f.bytes), f.episodes, f.successes, f.steps);
+    out += fmt::format("{}  {}, {}, {}, {}\n", f.path, size_text(f.bytes),
+                       counted(f.episodes, "episode"), counted(f.successes, "success"),
+                       counted(f.steps, "observation"));
     for (const auto& [outcome, names] : f.outcomes) {
       if (outcome != "success") out += outcome_line(outcome, names);
     }
   }
-  out += fmt::format("{} videos\n", videos.size());
+  out += fmt::format("{}\n", counted(videos.size(), "video"));
   for (const std::string& house : unfinished)
     out += fmt::format("{}: the recording has not ended; mjsense verify says what is missing\n",
                        house);

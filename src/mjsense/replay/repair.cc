@@ -19,6 +19,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/file_size_limit.h"
 #include "mjsense/core/files/regular_file.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/hdf5/untrusted_file.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/folder.h"
@@ -41,9 +42,8 @@ void remove_remains(const fs::path& house, const record::Folder& folder,
   const fs::path staging = house / record::kStagingDir;
   if (const std::size_t episodes = record::finished_episodes(house).size(); episodes > 0)
     throw RuntimeError(
-        fmt::format("'{}' contains {} finished episodes, but none of them identifies its "
-                    "recording; nothing was removed",
-                    staging.string(), episodes));
+        fmt::format("'{}' contains {}, but nothing identifies their recording; nothing was removed",
+                    staging.string(), counted(episodes, "finished episode")));
   if (!folder.remove(record::kStagingDir, folder.open_dir(record::kStagingDir)))
     throw RuntimeError(fmt::format("cannot remove '{}'", staging.string()));
   actions.push_back(
@@ -64,8 +64,8 @@ void finish_house(const fs::path& house, std::vector<std::string>& actions) {
   store.publish_all();
   for (const std::string& damage : store.damage())
     actions.push_back(fmt::format("{}: {}", house.string(), damage));
-  actions.push_back(fmt::format("{}: published {} finished episodes and ended the recording",
-                                house.string(), waiting - store.damage().size()));
+  actions.push_back(fmt::format("{}: published {} and ended the recording", house.string(),
+                                counted(waiting - store.damage().size(), "finished episode")));
 }
 
 // A new file with the bytes and the rights of `from`.
@@ -214,7 +214,7 @@ RepairResult repair(const fs::path& path) {
     attempt(file.path, [&] {
       if (const int added = name_videos(file.path); added > 0)
         result.actions.push_back(
-            fmt::format("{}: added {} video names", file.path.string(), added));
+            fmt::format("{}: added {}", file.path.string(), counted(added, "video name")));
     });
   }
   return result;

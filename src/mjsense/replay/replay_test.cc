@@ -221,7 +221,7 @@ class RepairNames : public ::testing::Test {
 TEST_F(RepairNames, BelongToTheirBatch) {
   std::string is;
   EXPECT_EQ(was, "episode_00000004_wrist_camera.mp4");
-  EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 video names"));
+  EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 video name"));
   in_videos(false, [&](hid_t videos) { is = read_file_name(videos, "wrist_camera"); });
   EXPECT_EQ(is, was);
   EXPECT_TRUE(verify(dir.path).ok()) << verify(dir.path).text();
@@ -253,7 +253,7 @@ TEST_F(RepairNames, AreAddedAtomically) {
 TEST_F(RepairNames, KeepThePermissionsOfTheFile) {
   for (const fs::perms mode : {fs::perms(0640), fs::perms(0444)}) {
     fs::permissions(path, mode);
-    EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 video names"));
+    EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 video name"));
     EXPECT_EQ(fs::status(path).permissions(), mode);
     fs::permissions(path, fs::perms(0600));
     in_videos(true, [&](hid_t videos) {
@@ -271,7 +271,7 @@ TEST_F(RepairNames, ByOneProcessAtATime) {
     EXPECT_THAT(repair(dir.path).text(), HasSubstr("another process is repairing"));
     EXPECT_TRUE(read_file(path) == bytes);
   }
-  EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 video names"));
+  EXPECT_THAT(repair(dir.path).text(), HasSubstr("added 1 video name"));
 }
 
 // "trajectories_batch_1_of_2.h5.bak" is a user's backup.

@@ -11,6 +11,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/files/regular_file.h"
 #include "mjsense/core/system/thread_pool.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/record/checksum.h"
 #include "mjsense/record/recorded_house.h"
 #include "mjsense/record/recording_lock.h"
@@ -179,7 +180,8 @@ class Verifier {
       facts = {probe.frames, probe.width, probe.height, ""};
     }
     if (facts.frames != video.frames)
-      return fmt::format("'{}' has {} frames, expected {}", video.name, facts.frames, video.frames);
+      return fmt::format("'{}' has {}, expected {}", video.name, counted(facts.frames, "frame"),
+                         video.frames);
     // Images of odd size have one additional column or row in 4:2:0 videos.
     const auto fits = [](int got, std::int64_t stated) {
       return stated == 0 || got == stated || got == (stated + 1) / 2 * 2;
@@ -235,9 +237,9 @@ class Verifier {
     }
     if (fs::exists(house / record::kStagingDir)) {
       const std::size_t waiting = record::finished_episodes(house).size();
-      error(context, fmt::format("is unfinished: {} finished episodes wait to be published; resume "
-                                 "the recording, or repair",
-                                 waiting));
+      error(context,
+            fmt::format("is unfinished: {} not yet published; resume the recording, or repair",
+                        counted(waiting, "finished episode")));
       return;  // an interrupted publication may already have moved some videos
     }
     for (const fs::directory_entry& entry : fs::directory_iterator(house)) {
@@ -283,9 +285,10 @@ std::string VerifyResult::text() const {
       out += "\n";
     }
   }
-  out += fmt::format("{}: {} files, {} episodes, {} observations, {} videos",
-                     ok() ? "intact" : "NOT intact", files, episodes, steps, videos);
-  if (unpublished > 0) out += fmt::format(", {} episodes not published", unpublished);
+  out += fmt::format("{}: {}, {}, {}, {}", ok() ? "intact" : "NOT intact", counted(files, "file"),
+                     counted(episodes, "episode"), counted(steps, "observation"),
+                     counted(videos, "video"));
+  if (unpublished > 0) out += fmt::format(", {} not published", counted(unpublished, "episode"));
   return out + "\n";
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/scene/model_parts.h"
 
 namespace mjsense::scene {
@@ -45,9 +46,9 @@ void check_elements(const mjSpec* spec, const std::string& who) {
     const std::size_t count = spec_elements(spec, type).size();
     if (count > 0)
       throw ValueError(
-          fmt::format("{}: its model has {} element{} of type {}: surroundings that are only seen "
+          fmt::format("{}: its model has {} of type {}: surroundings that are only seen "
                       "have geoms and lights only",
-                      who, count, count > 1 ? "s" : "", name));
+                      who, counted(count, "element"), name));
   }
 }
 

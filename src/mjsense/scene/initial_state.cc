@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/core/text/name_matching.h"
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/resolve.h"
@@ -107,8 +108,8 @@ class Merger {
   void put(const std::vector<double>& values, mjtNum* target, Run run, int width,
            const char* field) const {
     if (static_cast<int>(values.size()) > run.size * width) {
-      throw ValueError(fmt::format("{}: its keyframe has {} values of {}, but its model has {}",
-                                   context_, values.size(), field, run.size * width));
+      throw ValueError(fmt::format("{}: its keyframe has {} of {}, but its model has {}", context_,
+                                   counted(values.size(), "value"), field, run.size * width));
     }
     if (run.size > 0) std::copy(values.begin(), values.end(), target + run.start * width);
   }

@@ -11,6 +11,7 @@
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/fields/toml_value.h"
 #include "mjsense/core/files/data_file.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/scene/mj_spec.h"
 #include "mjsense/scene/model_parts.h"
 #include "mjsense_tasks/robots/real_meshes.h"
@@ -58,12 +59,12 @@ void check_references(const RobotCfg& cfg, const mjSpec* spec, const std::string
 
 void validate(const MoveGroupCfg& cfg, std::string_view context) {
   if (!cfg.spread.empty() && cfg.spread.size() != cfg.init.size()) {
-    throw ValueError(fmt::format("{}: '{}': spread has {} values, init has {}", context, cfg.name,
-                                 cfg.spread.size(), cfg.init.size()));
+    throw ValueError(fmt::format("{}: '{}': spread has {}, init has {}", context, cfg.name,
+                                 counted(cfg.spread.size(), "value"), cfg.init.size()));
   }
   if (!cfg.low_init.empty() && cfg.low_init.size() != cfg.init.size()) {
-    throw ValueError(fmt::format("{}: '{}': stooped has {} values, init has {}", context, cfg.name,
-                                 cfg.low_init.size(), cfg.init.size()));
+    throw ValueError(fmt::format("{}: '{}': stooped has {}, init has {}", context, cfg.name,
+                                 counted(cfg.low_init.size(), "value"), cfg.init.size()));
   }
   if (cfg.kind == GroupKind::kBase && !cfg.init.empty()) {
     throw ValueError(

@@ -5,6 +5,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/pose.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense_tasks/robots/action.h"
 
@@ -70,8 +71,9 @@ MoveGroup resolve_group(const MoveGroupCfg& cfg, const mjModel* model, const std
   check_size(context, "joint positions", group.qpos.size());
   check_size(context, "actuators", group.actuators.size());
   if (!cfg.init.empty() && cfg.init.size() != group.qpos.size()) {
-    throw ValueError(fmt::format("{}: {} start positions (init) for {} joints with {} positions",
-                                 context, cfg.init.size(), cfg.joints.size(), group.qpos.size()));
+    throw ValueError(fmt::format(
+        "{}: {} (init) for {} with {}", context, counted(cfg.init.size(), "start position"),
+        counted(cfg.joints.size(), "joint"), counted(group.qpos.size(), "position")));
   }
   if (!cfg.init.empty()) check_init(model, group, cfg, context);
   if (!cfg.leaf_site.empty()) group.leaf_site = find(mjOBJ_SITE, cfg.leaf_site);

@@ -11,6 +11,7 @@
 #include "mjsense/core/model_geometry.h"
 #include "mjsense/core/mujoco_objects.h"
 #include "mjsense/core/named.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense_tasks/robots/action_noise.h"
 
@@ -233,8 +234,8 @@ void Robot::write_group(const StateRow& state, std::string_view name,
                         std::span<const double> positions) const {
   const MoveGroup& group = this->group(name);
   if (positions.size() != group.qpos.size())
-    throw ValueError(fmt::format("robot '{}': group '{}' has {} joint positions, not {}", cfg_.name,
-                                 name, group.qpos.size(), positions.size()));
+    throw ValueError(fmt::format("robot '{}': group '{}' has {}, not {}", cfg_.name, name,
+                                 counted(group.qpos.size(), "joint position"), positions.size()));
   for (std::size_t i = 0; i < positions.size(); ++i) state.qpos[group.qpos[i]] = positions[i];
   for (int dof : group.dofs) state.qvel[dof] = 0;
 }

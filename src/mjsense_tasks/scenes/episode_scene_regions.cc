@@ -73,14 +73,41 @@ LevelBox surface_named(const mjModel* m, const std::string& name, const std::str
                            : fmt::format("{}: geom '{}' must be a level, fixed box", who, name));
 }
 
+// Throws ValueError unless all corners are on the surface `on`, or on a neighbour of the same height:
+// an object would start in the air. A tabletop may consist of several boxes.
+void check_on_surface(const mjModel* m, const LevelBox& on, const Area& area,
+                      const std::string& who) {
+  constexpr double kRounding = 1e-6, kSameHeight = 1e-3;  // m
+  const auto is_on = [](const LevelBox& box, double x, double y) {
+    return std::abs(x - box.x) <= box.wide + kRounding &&
+           std::abs(y - box.y) <= box.deep + kRounding;
+  };
+  for (const double x : {area.x0, area.x1}) {
+    for (const double y : {area.y0, area.y1}) {
+      bool found = is_on(on, x, y);
+      for (int g = 0; g < m->ngeom && !found; ++g) {
+        const std::optional<LevelBox> box = level_box(m, g);
+        found = box && std::abs(box->top - on.top) <= kSameHeight && is_on(*box, x, y);
+      }
+      if (found) continue;
+      throw ValueError(
+          fmt::format("{} is [{}, {}, {}, {}]: ({}, {}) is not on the surface, which has x from "
+                      "{:.6g} to {:.6g} "
+                      "and y from {:.6g} to {:.6g}",
+                      who, area.x0, area.x1, area.y0, area.y1, x, y, on.x - on.wide, on.x + on.wide,
+                      on.y - on.deep, on.y + on.deep));
+    }
+  }
+}
+
 }  // namespace
 
 void EpisodeScene::find_regions() {
   regions_.clear();
   region_bodies_.clear();
   for (const SceneRegionCfg& one : cfg_.regions) {
-    const LevelBox on =
-        surface_named(model_, one.on, fmt::format("{}, region '{}'", context(), one.name));
+    const std::string who = fmt::format("{}, region '{}'", context(), one.name);
+    const LevelBox on = surface_named(model_, one.on, who);
     const auto area = [](const std::array<double, 4>& a) { return Area{a[0], a[1], a[2], a[3]}; };
     Region region{};
     region.height = on.top;
@@ -88,6 +115,8 @@ void EpisodeScene::find_regions() {
                       ? Area{on.x - on.wide, on.x + on.wide, on.y - on.deep, on.y + on.deep}
                       : area(one.area);
     region.target_area = one.target_area ? area(*one.target_area) : region.area;
+    check_on_surface(model_, on, region.area, who + ": area");
+    check_on_surface(model_, on, region.target_area, who + ": target_area");
     regions_.push_back(region);
     region_bodies_.push_back(model_->geom_bodyid[on.geom]);
   }

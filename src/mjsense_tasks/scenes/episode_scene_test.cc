@@ -480,6 +480,17 @@ TEST(EpisodeScene, FaultsNameTheSetting) {
   EXPECT_THAT(fault([](auto& c) { c.objects = {{"room/table"}}; }), HasSubstr("has no free joint"));
   EXPECT_THAT(fault([](auto& c) { c.count = {3, 1}; }), HasSubstr("count is 3, 1"));
   EXPECT_THAT(fault([](auto& c) { c.regions[0].area = {1, 0, 0, 1}; }), HasSubstr("min x, max x"));
+  EXPECT_THAT(
+      fault([](auto& c) {
+        c.regions[0].area = {.5, 1.6, 0, .2};
+      }),
+      HasSubstr("region 'table': area is [0.5, 1.6, 0, 0.2]: (1.6, 0) is not on the surface, "
+                "which has x from 0.5 to 1.5 and y from"));
+  EXPECT_THAT(
+      fault([](auto& c) {
+        c.regions[0].target_area = {3, 4, 3, 4};
+      }),
+      HasSubstr("region 'table': target_area is [3, 4, 3, 4]: (3, 3) is not on the surface"));
   EXPECT_THAT(fault([](auto& c) {
                 SceneVaryCfg vary;
                 vary.pattern = "rom/.*";

@@ -11,6 +11,7 @@ from mjsense.compat.mjlab._data import Data
 from mjsense.compat.mjlab._targets import NAMES, Targets
 from mjsense.compat.mjlab._tensors import ids, tensor
 from mjsense.core import mujoco_names
+from mjsense.core.counted import counted
 
 _FREE, _BALL = 0, 1  # mjJNT_FREE, mjJNT_BALL
 
@@ -96,7 +97,8 @@ class EntityData:
         place = (rows if isinstance(rows, slice) else rows[:, None], columns)
         if values.shape[-1] not in (1, len(columns)):
             raise ValueError(
-                f"entity '{self._name}': {values.shape[-1]} numbers of {field} for each world, and it has {len(columns)}"
+                f"entity '{self._name}': {counted(values.shape[-1], 'number')} of {field} for each world, and it has "
+                f"{len(columns)}"
             )
         target[place] = _like(values, target)
 
@@ -137,7 +139,7 @@ class EntityData:
                 continue
             if len(values.shape) < 2 or tuple(values.shape[-2:]) not in ((len(bodies), 3), (1, 3)):
                 raise ValueError(
-                    f"entity '{self._name}': a wrench of the shape {tuple(values.shape)} is for {len(bodies)} bodies: "
+                    f"entity '{self._name}': a wrench of the shape {tuple(values.shape)} is for {counted(len(bodies), 'body')}: "
                     f"[worlds, {len(bodies)}, 3]"
                 )
             target = self._field("xfrc_applied")
@@ -148,7 +150,7 @@ class EntityData:
         if self._mocap < 0:
             raise ValueError(f"entity '{self._name}' has no mocap body as its root: its mocap pose cannot be written")
         if pose.shape[-1] != 7:
-            raise ValueError(f"entity '{self._name}': {pose.shape[-1]} numbers of a mocap pose, not 7")
+            raise ValueError(f"entity '{self._name}': {counted(pose.shape[-1], 'number')} of a mocap pose, not 7")
         for field, place in (("mocap_pos", slice(0, 3)), ("mocap_quat", slice(3, 7))):
             target = self._field(field)
             target[self._rows(env_ids), self._mocap] = _like(pose[:, place], target)
@@ -165,7 +167,9 @@ class EntityData:
         chosen = ids(element_ids)
         columns = columns if chosen is None else np.atleast_1d(columns[chosen])
         if len(values.shape) and values.shape[-1] not in (1, len(columns)):
-            raise ValueError(f"entity '{self._name}': {values.shape[-1]} numbers of {name} for {len(columns)} elements")
+            raise ValueError(
+                f"entity '{self._name}': {counted(values.shape[-1], 'number')} of {name} for {len(columns)} elements"
+            )
         target[rows if isinstance(rows, slice) else rows[:, None], columns] = _like(values, target)
 
     # What tasks read.

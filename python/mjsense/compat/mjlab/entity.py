@@ -13,6 +13,7 @@ import numpy as np
 from mjsense.compat.mjlab._entity_data import EntityData
 from mjsense.compat.mjlab._names import find, value_of
 from mjsense.compat.mjlab.actuator import ActuatorCfg, TransmissionType, XmlActuatorCfg
+from mjsense.core.counted import counted
 from mjsense.sensors import configs
 
 _FREE = mujoco.mjtJoint.mjJNT_FREE
@@ -208,7 +209,7 @@ class Entity:
     def write_root_state_to_sim(self, root_state: Any, env_ids: Any = None) -> None:
         """Pose (m, wxyz), linear and angular velocity of the root in the world's frame, ``[N, 13]``."""
         if root_state.shape[-1] != 13:
-            raise ValueError(f"write_root_state_to_sim: root_state has {root_state.shape[-1]} columns, not 13")
+            raise ValueError(f"write_root_state_to_sim: root_state has {counted(root_state.shape[-1], 'column')}, not 13")
         self.write_root_link_pose_to_sim(root_state[:, :7], env_ids)
         self.write_root_link_velocity_to_sim(root_state[:, 7:], env_ids)
 

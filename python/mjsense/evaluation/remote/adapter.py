@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from mjsense.core.counted import counted
 from mjsense.core.errors import did_you_mean
 from mjsense.core.optional import optional
 from mjsense.evaluation.remote.messages import Arrays
@@ -42,7 +43,9 @@ class Numbers:
         """The numbers of ``values`` ``[..., n]``."""
         if self.columns is not None:
             if max(self.columns) >= values.shape[-1]:
-                raise ValueError(f"{what} has {values.shape[-1]} columns, and the adapter takes column {max(self.columns)}")
+                raise ValueError(
+                    f"{what} has {counted(values.shape[-1], 'column')}, and the adapter takes column {max(self.columns)}"
+                )
             values = values[..., list(self.columns)]
         if (self.threshold is not None or self.source is not None) and values.dtype.kind != "f":
             values = values.astype(np.float64)
@@ -136,7 +139,7 @@ class Adapter:
             width, columns, to = groups[group].stop - groups[group].start, one.numbers.columns, one.numbers.target
             if columns is not None and len(columns) != width:
                 raise ValueError(
-                    f"adapter '{self.name}': {len(columns)} columns for the move group '{group}', which takes {width}"
+                    f"adapter '{self.name}': {counted(len(columns), 'column')} for the move group '{group}', which takes {width}"
                 )
             if to is not None and not (low[groups[group]].max() <= min(to) and max(to) <= high[groups[group]].min()):
                 raise ValueError(

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/text/counted.h"
 
 namespace mjsense::render {
 
@@ -28,8 +29,8 @@ void check_texture_maps(const mjModel* m) {
       if (m->tex_type[id] != mjTEXTURE_2D) fail("is a cube map; it must be of type 2d");
       const int channels = m->tex_nchannel[id];
       if (channels == 2 || (colored && channels < 3))
-        fail(fmt::format("has {} channel{}; it must have 3 or 4{}", channels,
-                         channels == 1 ? "" : "s", colored ? "" : ", or 1"));
+        fail(fmt::format("has {}; it must have 3 or 4{}", counted(channels, "channel"),
+                         colored ? "" : ", or 1"));
     }
   }
 }

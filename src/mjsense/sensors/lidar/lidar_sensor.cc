@@ -10,6 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/fields/fields.h"
 #include "mjsense/core/fields/sensor_fields.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/sensors/lidar/npy.h"
 #include "mjsense/sensors/raycast/raycast_data.h"
 
@@ -52,8 +53,8 @@ void validate(const SpinningScan& s, std::string_view context) {
   check_ray_count(static_cast<double>(s.channels) * s.samples, context);
   if (!s.elevations_deg.empty() && static_cast<int>(s.elevations_deg.size()) != s.channels)
     throw ValueError(
-        fmt::format("{}: elevations_deg has {} values, channels is {}: expected one per channel",
-                    context, s.elevations_deg.size(), s.channels));
+        fmt::format("{}: elevations_deg has {}, channels is {}: expected one per channel", context,
+                    counted(s.elevations_deg.size(), "value"), s.channels));
 }
 
 namespace {

@@ -295,7 +295,7 @@ TEST(Lidar, ErrorsNameTheSetting) {
   using Cfg = LidarSensorCfg;
   EXPECT_THAT(with([](Cfg& c) { c.dropout = 2; }), HasSubstr("sensor 'lidar': dropout is 2"));
   EXPECT_THAT(with([](Cfg& c) { c.scan = SpinningScan{.channels = 2, .elevations_deg = {1}}; }),
-              HasSubstr("elevations_deg has 1 values, channels is 2"));
+              HasSubstr("elevations_deg has 1 value, channels is 2"));
   EXPECT_THAT(with([](Cfg& c) { c.scan = TableScan{}; }), HasSubstr("no rows"));
   EXPECT_THAT(with([](Cfg& c) { c.scan = TableScan{.file = "nowhere.npy"}; }),
               HasSubstr("sensor 'lidar': scan table 'nowhere.npy': cannot be opened"));

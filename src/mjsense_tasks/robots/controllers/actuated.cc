@@ -7,6 +7,7 @@
 #include <algorithm>
 
 #include "mjsense/core/error.h"
+#include "mjsense/core/text/counted.h"
 #include "mjsense/scene/resolve.h"
 
 namespace mjsense::tasks::robots {
@@ -100,8 +101,8 @@ void ActuatedController::begin(const World& /*world*/, std::span<const double> t
 void ActuatedController::need_position_servos(const ControllerInit& init, const char* kind,
                                               int count) const {
   if (count > 0 && size() != count) {
-    throw ValueError(fmt::format("{}: the controller '{}' needs {} actuators; the group has {}",
-                                 init.context, kind, count, size()));
+    throw ValueError(fmt::format("{}: the controller '{}' needs {}; the group has {}", init.context,
+                                 kind, counted(count, "actuator"), size()));
   }
   for (int a : group_.actuators) {
     if (is_position_servo(model_, a)) continue;
