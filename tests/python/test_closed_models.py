@@ -178,9 +178,10 @@ def test_folders_of_the_compiler(tmp_path):
     (dict(text="<mujoco><actuator>" + "<muscle joint='j'/>" * 5000 + "</actuator></mujoco>"), "length ranges of muscles"),
     (dict(text="<mujoco><option iterations='2000000000'/></mujoco>"), "iterations of 'option'"),
     (dict(text="<mujoco><compiler><lengthrange inttotal='1e9'/></compiler></mujoco>"), "inttotal / timestep"),
+    (dict(asset="<mesh name='m' file='m.obj'/>", members={"m.obj": OBJ + b"f" + b" 1" * 5000}), "the longest line of the mesh 'm.obj' is 10001, the limit is 8192 bytes"),
     (dict(body="<camera name='c' resolution='9999999 2'/>"), "resolution of 'camera'"),
     (dict(body="<body>" * 300 + "<joint/>" * 1 + "</body>" * 300 + "".join("<body>" + "<joint/>" * 9000 + "</body>")), "inertia matrix"),
-], ids=range(18))  # fmt: skip
+], ids=range(19))  # fmt: skip
 def test_sizes_are_refused_before_they_are_allocated(given, why):
     with pytest.raises(ValueError, match=why) as error:
         closed(**given)

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import re
 import struct
@@ -22,6 +23,8 @@ MAX_COPIES, MAX_COPIES_WITH_SENSORS = 4000, 8
 writes models without ``replicate``, so that recordings have none."""
 MAX_NUMBERS = 50_000_000
 """Numbers of sparse matrices, keyframes, histories, user data and tables."""
+MAX_LINE = 1 << 13
+"""Bytes of a line of an OBJ file: MuJoCo needs time that grows with the square of a polygon's corners, 9 s for 60,000."""
 MAX_SUBSTEPS = 100_000
 MAX_LENGTH_WORK = 300_000_000
 """Elements x steps that the compiler simulates to find the ranges of muscles. 80 muscles in a model of 500 elements take a
@@ -224,6 +227,10 @@ class _Sizes:
                 )
 
     def _check_meshes(self, root: Element) -> None:
+        named = {(mesh.get("file", ""), mesh.get("content_type", "")) for mesh in root.iter("mesh")}
+        for name in {name for name, kind in named if name.lower().endswith(".obj") or (name and kind == "model/obj")}:
+            if (longest := max(map(len, io.BytesIO(self._members[name])), default=0)) > MAX_LINE:
+                self._fail(f"the longest line of the mesh {name[:120]!r}", longest, f"{MAX_LINE} bytes")
         for mesh in root.iter("mesh"):
             if "builtin" not in mesh.attrib:
                 continue
