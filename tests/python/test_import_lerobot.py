@@ -63,7 +63,7 @@ def test_errors(made, tmp_path, capsys):
     (tmp_path / "scene.xml").write_text("<mujoco><worldbody><body><joint name='arm_9'/><geom size='1'/></body></worldbody></mujoco>")
     with pytest.raises(mjs.UnknownNameError, match=r"no hinge or slide joint 'arm_0'.*of arm_9"):
         mjs.import_lerobot(made / "out", tmp_path / "a", scene=tmp_path / "scene.xml")
-    with pytest.raises(ValueError, match=r"names 1 joints, but observation.state has 7 numbers"):
+    with pytest.raises(ValueError, match=r"names 1 joint, but observation.state has 7 numbers"):
         mjs.import_lerobot(made / "out", tmp_path / "a", scene=tmp_path / "scene.xml", joints=["arm_9"])
     with pytest.raises(FileNotFoundError, match="is not a LeRobot data set"):
         mjs.import_lerobot(made / "data", tmp_path / "a")

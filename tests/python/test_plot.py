@@ -127,7 +127,7 @@ def test_notebooks(recording, tmp_path):
     text = scene._repr_html_()
     configured, folded = text.split("<details>")
     assert "&#x27;touch&#x27;" in configured and "ball/acc" in folded  # those of the model's XML are folded
-    assert "bodies" in repr(scene["ball"]) and "<td style='text-align:left'>body</td>" in scene["ball"]._repr_html_()
+    assert "1 body, 1 joint" in repr(scene["ball"]) and "<td style='text-align:left'>body</td>" in scene["ball"]._repr_html_()
     assert "<td style='text-align:left'>3</td>" in sim._repr_html_() and text in sim._repr_html_()
     sim.close()
     assert "closed" in sim._repr_html_()
