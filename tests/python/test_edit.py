@@ -27,7 +27,7 @@ def root(tmp_path_factory):
 def verified(out):
     done = run_program("verify", str(out), "--decode")
     assert done.returncode == 0 and "note" not in done.stdout, done.stdout + done.stderr
-    return int(done.stdout.split(" episodes")[0].split()[-1])
+    return int(done.stdout.split(" episode")[0].split()[-1])
 
 
 def contents(episode):
