@@ -90,7 +90,7 @@ TEST(Replay, UnfinishedRecordingIsReadableAndRepairable) {
   EXPECT_EQ(before.episodes, 3);
   EXPECT_EQ(before.videos, 6);
   ASSERT_THAT(before.findings, SizeIs(1)) << before.text();
-  EXPECT_THAT(before.findings[0].text, HasSubstr("3 finished episodes wait"));
+  EXPECT_THAT(before.findings[0].text, HasSubstr("3 finished episodes not yet published"));
   EXPECT_THAT(repair(dir.path).text(), HasSubstr("published 3 finished episodes"));
   const VerifyResult after = verify(dir.path);
   EXPECT_TRUE(after.ok()) << after.text();
