@@ -79,7 +79,7 @@ TEST(Live, RecordingMayContinueDuringVerify) {
     for (const Finding& f : found.findings)
       EXPECT_THAT(f.text, ::testing::AnyOf(HasSubstr("is being recorded"),
                                            HasSubstr("changed while it was being read"),
-                                           HasSubstr("finished episodes wait")))
+                                           HasSubstr("not yet published")))
           << f.context;
   }
   recording.join();
