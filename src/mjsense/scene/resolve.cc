@@ -52,10 +52,6 @@ std::vector<std::string> model_names(const mjModel* model, mjtObj type) {
   return names;
 }
 
-int count_of(const mjModel* model, mjtObj type) {
-  return mjsense::count_of(model, static_cast<int>(type));
-}
-
 int resolve(const mjModel* model, mjtObj type, std::string_view full_name,
             std::string_view context) {
   const std::string name(full_name);

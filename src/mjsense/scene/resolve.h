@@ -22,7 +22,6 @@ std::string obj_type_name(mjtObj type);
 // Names of all elements of a type in model order; "" for unnamed ones. XBODY is treated as BODY.
 std::vector<std::string> model_names(const mjModel* model, mjtObj type);
 std::string name_of(const mjModel* model, mjtObj type, int id);  // full name, "" if unnamed
-int count_of(const mjModel* model, mjtObj type);
 
 // Returns the id of the element with this full name. Throws KeyError with the place and the nearest
 // names.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <set>
 
+#include "mjsense/core/element_count.h"
 #include "mjsense/core/error.h"
 #include "mjsense/core/text/name_matching.h"
 #include "mjsense/scene/resolve.h"
@@ -23,7 +24,7 @@ Named named(const mjModel* m, mjtObj type, const std::string& prefix) {
   Named found;
   // the world body is not part of the robot
   const int first = type == mjOBJ_BODY && prefix.empty() ? 1 : 0;
-  for (int id = first; id < scene::count_of(m, type); ++id) {
+  for (int id = first; id < count_of(m, type); ++id) {
     const std::string name = scene::name_of(m, type, id);
     if (!name.starts_with(prefix)) continue;
     found.names.push_back(name.substr(prefix.size()));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "mjsense/sensors/camera/pixel_owners.h"
 
+#include "mjsense/core/element_count.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense/scene/scene.h"
 
@@ -8,7 +9,7 @@ namespace mjsense::sensors {
 namespace {
 
 std::vector<std::int32_t> entity_of_each(const SensorInit& init, mjtObj type) {
-  std::vector<std::int32_t> owners(scene::count_of(init.model, type), -1);
+  std::vector<std::int32_t> owners(count_of(init.model, type), -1);
   if (init.scene == nullptr) return owners;
   std::int32_t entity = 0;
   for (const scene::Entity& e : init.scene->entities()) {
