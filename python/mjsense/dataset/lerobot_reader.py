@@ -18,7 +18,7 @@ from mjsense.core.optional import optional
 from mjsense.dataset import bounded_json, parquet_footer
 from mjsense.dataset import foreign_values as foreign
 from mjsense.dataset.lerobot_features import Feature
-from mjsense.dataset.model_sizes import image_size, text_size
+from mjsense.dataset.png_sizes import image_size, text_size
 
 STATE = "observation.state"
 RESULTS = ("next.reward", "next.success", "next.done")
