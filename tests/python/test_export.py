@@ -366,7 +366,7 @@ def test_wrong_maps_and_recordings(root, tmp_path):
     ):
         with pytest.raises(ValueError, match=message):
             Source(root, map=table)
-    with pytest.raises(mjs.UnknownNameError, match=r"Feature 'state' \(chosen with a map: map=, --map\): No stream.*qpso"):
+    with pytest.raises(mjs.UnknownNameError, match=r"Feature 'state' \(a map, map= or --map, chooses its streams\): No stream.*qpso"):
         Source(root, map={"state": "obs/agent/qpso"})
     with pytest.raises(mjs.UnknownNameError, match="no video 'wrist'"):
         Source(root, map={"cameras": {"a": "wrist"}})

@@ -81,15 +81,12 @@ class Dataset:
         chosen = [Episode(entry, i, self._store) for i, entry in enumerate(entries)]
         if episodes is not None:
             chosen = [chosen[i] for i in _numbers(episodes, len(chosen), self.root)]
-        counts = Counter(entry.outcome for entry in entries)
-        common = ", ".join(f"{count} x {printable(text)!r}" for text, count in counts.most_common(10))
-        contents = f"{self.root} has {common or 'no episodes'}"
-        contents += ", ..." if len(counts) > 10 else ""
+        outcomes = [entry.outcome for entry in entries]
         if outcome is not None:
             wanted = outcome if callable(outcome) else [outcome] if isinstance(outcome, str) else list(outcome)
             for one in () if callable(wanted) else wanted:
-                if not any(_matches(text, [one]) for text in counts):
-                    raise ValueError(f"outcome: no episode has the outcome {one!r}; {contents}")
+                if not any(_matches(text, [one]) for text in set(outcomes)):
+                    raise ValueError(f"outcome: no episode has the outcome {one!r}; {self.root} has {_common(outcomes)}")
             chosen = [episode for episode in chosen if _matches(episode.outcome, wanted)]
         if success is not None:
             chosen = [episode for episode in chosen if episode.success == success]
@@ -112,7 +109,7 @@ class Dataset:
         self._windows: dict[str, list[int]] = {}
         if not chosen:
             if delta_timestamps or streams:
-                raise ValueError(f"{self.root}: no episode matches; {contents}")
+                raise ValueError(f"{self.root}: no episode matches; it has {_common(outcomes)}")
             return
         self._fps = self._common_fps()
         self._choose_streams(None if streams is None else list(streams), delta_timestamps or {}, tolerance_s)
@@ -353,6 +350,13 @@ def _numbers(episodes: Iterable[int], count: int, root: Path) -> list[int]:
         if not 0 <= i < count:
             raise ValueError(f"episodes: {i} is not in {root}, which has {counted(count, 'episode')}")
     return array.tolist()
+
+
+def _common(outcomes: Sequence[str]) -> str:
+    """The ten most common outcomes, with their numbers."""
+    counts = Counter(outcomes)
+    common = [f"{count} x {printable(text)!r}" for text, count in counts.most_common(10)]
+    return ", ".join(common + ["..."] * (len(counts) > 10)) or "no episodes"
 
 
 def _matches(outcome: str, wanted: Sequence[str] | Callable[[str], bool]) -> bool:

@@ -136,7 +136,7 @@ class Packets:
                 stored += packet.size
                 if stored > file.size or not -frames <= frame <= 2 * frames:
                     why = f"the time of frame {frame}" if stored <= file.size else f"packets of {stored} bytes in {file.size}"
-                    raise RuntimeError(f"{path}: has {why}; its episode has {frames} observations")
+                    raise RuntimeError(f"{path}: has {why}; its episode has {counted(frames, 'observation')}")
                 self.exact &= at == frame
                 if packet.is_keyframe:
                     self.keys.append(len(self.sizes))

@@ -296,7 +296,7 @@ def _feature(chosen: Dataset, name: str, streams: tuple[str, ...], known: dict[s
     try:
         expanded = chosen._expand_all(streams, known)
     except UnknownNameError as error:
-        raise UnknownNameError(f"Feature '{name}' (chosen with a map: map=, --map): {error.args[0]}") from error
+        raise UnknownNameError(f"Feature '{name}' (a map, map= or --map, chooses its streams): {error.args[0]}") from error
     found = list(dict.fromkeys(stream for stream in expanded if "/given/" not in stream))
     names: list[str] = []
     parts: dict[str, slice] = {}

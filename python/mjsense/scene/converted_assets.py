@@ -57,6 +57,8 @@ def convert_assets(
     if not 0 < scale < float("inf"):
         raise ValueError(f"{source}: scale is {scale}: must be positive")
     frame = np.diag([scale, scale, scale, 1.0]) @ (_Y_UP if (up or _UP[kind]) == "y" else np.eye(4))
+    for package in ("trimesh", "PIL"):
+        optional(package, "convert", "Converting assets")
     with _reading(source):
         parts = list(_parts(source, frame))
     if not parts:
@@ -76,6 +78,10 @@ def _name(text: str) -> str:
     return "".join(c if c.isalnum() and c.isascii() else "_" for c in text) or "asset"
 
 
+class _Refused(ValueError):
+    """An error that already names the file."""
+
+
 @contextlib.contextmanager
 def _reading(source: Path, *other: type[Exception]) -> Iterator[None]:
     """Errors of trimesh, Pillow and NumPy as one that names the file: they raise whatever they meet in a damaged file.
@@ -85,21 +91,19 @@ def _reading(source: Path, *other: type[Exception]) -> Iterator[None]:
     """
     try:
         yield
-    except other:
+    except (_Refused, *other):
         raise
     except Exception as error:
-        if isinstance(error, (ValueError, ModuleNotFoundError)) and str(error).startswith((f"{source}: ", "Converting assets")):
-            raise
-        raise ValueError(f"{source}: cannot be read: {type(error).__name__}: {' '.join(str(error).split())[:200]}") from error
+        raise _Refused(f"{source}: cannot be read: {type(error).__name__}: {' '.join(str(error).split())[:200]}") from error
 
 
 def _loaded(source: Path) -> Any:
-    trimesh = optional("trimesh", "convert", "Converting assets")
-    optional("PIL", "convert", "Converting assets")
+    import trimesh
+
     if not source.is_file():
-        raise ValueError(f"{source}: no such file")
+        raise _Refused(f"{source}: no such file")
     if source.stat().st_size > _MAX_BYTES:
-        raise ValueError(f"{source}: has {source.stat().st_size} bytes: at most {_MAX_BYTES} are read")
+        raise _Refused(f"{source}: has {source.stat().st_size} bytes: at most {_MAX_BYTES} are read")
     return trimesh.load_scene(source, process=False)
 
 
@@ -114,11 +118,11 @@ def _parts(source: Path, frame: np.ndarray) -> Iterator[tuple[np.ndarray, np.nda
             continue
         faces += len(mesh.faces)
         if faces > _MAX_FACES:
-            raise ValueError(f"{source}: has more than {_MAX_FACES} triangles")
+            raise _Refused(f"{source}: has more than {_MAX_FACES} triangles")
         mesh = mesh.copy()
         mesh.apply_transform(frame @ transform)
         if not np.isfinite(mesh.vertices).all():
-            raise ValueError(f"{source}: mesh '{geometry}' has vertices that are not finite")
+            raise _Refused(f"{source}: mesh '{geometry}' has vertices that are not finite")
         visual = mesh.visual
         coordinates = getattr(visual, "uv", None)
         yield mesh.vertices, mesh.faces, _normals(mesh.vertices, mesh.faces), coordinates, visual
@@ -225,7 +229,7 @@ class _Writer:
 
     def _pixels(self, image: Any, mode: str) -> np.ndarray:
         if image.size[0] * image.size[1] > _MAX_PIXELS:
-            raise ValueError(
+            raise _Refused(
                 f"{self._source}: a texture has {image.size[0]} x {image.size[1]} pixels: at most {_MAX_PIXELS} are read"
             )
         with _reading(self._source):  # Pillow decodes here, and calls what is damaged an OSError

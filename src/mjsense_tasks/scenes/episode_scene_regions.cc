@@ -92,8 +92,7 @@ void check_on_surface(const mjModel* m, const LevelBox& on, const Area& area,
       if (found) continue;
       throw ValueError(
           fmt::format("{} is [{}, {}, {}, {}]: ({}, {}) is not on the surface, which has x from "
-                      "{:.6g} to {:.6g} "
-                      "and y from {:.6g} to {:.6g}",
+                      "{:.6g} to {:.6g} and y from {:.6g} to {:.6g}",
                       who, area.x0, area.x1, area.y0, area.y1, x, y, on.x - on.wide, on.x + on.wide,
                       on.y - on.deep, on.y + on.deep));
     }
