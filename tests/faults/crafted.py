@@ -235,6 +235,13 @@ def chunk_that_is_not_packed_and_short(f):
     dataset.id.write_direct_chunk((0, 0), b"fifteen letters")
 
 
+@case
+def chunk_that_is_not_packed_and_long(f):
+    rows = len(f["traj_0/success"])
+    dataset = replace(f["traj_0/obs/agent"], "qpos", shape=(rows, 1), dtype="f8", chunks=(rows, 1))
+    dataset.id.write_direct_chunk((0, 0), b"x" * 4_000_000)
+
+
 # ---- links
 
 

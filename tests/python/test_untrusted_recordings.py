@@ -281,6 +281,11 @@ def short_plain_chunk(group, rows):
     group.create_dataset("evil", shape=(rows, 1000), dtype="f8", chunks=(rows, 1000)).id.write_direct_chunk((0, 0), b"x")
 
 
+def long_plain_chunk(group, rows):
+    """More bytes than the chunk has: HDF5 would write them all into the memory that h5py allocates for a whole chunk."""
+    group.create_dataset("evil", shape=(rows, 1), dtype="f8", chunks=(rows, 1)).id.write_direct_chunk((0, 0), b"x" * 4_000_000)
+
+
 def json_rows(row):
     def make(group, rows):
         made = group.create_dataset("evil", data=np.tile(np.frombuffer(row, np.uint8), (rows, 1)), compression="gzip")
@@ -298,7 +303,8 @@ def json_rows(row):
         (dataset_of(lambda g, n: g.create_dataset("evil", shape=(n, 10**6, 8), chunks=(n, 10**6, 8), dtype="f8", compression="gzip")), "has chunks of 320000000 bytes"),
         (dataset_of(lambda g, n: g.create_dataset("evil", shape=(n, 4 * 10**6), chunks=(1, 10**6), dtype="f8", compression="gzip")), "declares 160000000 bytes but stores 0"),
         (dataset_of(short_chunk), "is damaged: one of its chunks does not"),
-        (dataset_of(short_plain_chunk), "is damaged: one of its chunks does not"),
+        (dataset_of(short_plain_chunk), "is damaged: one of its chunks has 1 byte, expected 40000"),
+        (dataset_of(long_plain_chunk), "is damaged: one of its chunks has 4000000 bytes, expected 40"),
         (dataset_of(lambda g, n: g.create_dataset("evil", data=np.zeros((n + 1, 3)))), f"has {6} rows"),
         (json_rows(b'{"a":' * 20000 + b"1" + b"}" * 20000), "evil row 0 is"),
         (json_rows(b'{"../../escaped": [1.0]}'), "has the key '../../escaped', which is not a plain name"),
