@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import mjsense as mjs
+from mjsense import _core
 from mjsense.compat import molmospaces
 from mjsense.compat.molmospaces.env.abstract_sensors import SensorSuite
 from mjsense.compat.molmospaces.env.sensors import GraspStateSensor, ObjectStartPoseSensor, get_core_sensors
@@ -271,3 +272,13 @@ def test_invalid_suite_is_rejected():
         mjs.make_vec(Wrong, cameras=[])
     with pytest.raises(NotImplementedError, match="BaseMujocoTask: write _create_sensor_suite_from_config"):
         mjs.make_vec(BaseMujocoTask, cameras=[])
+
+
+def test_segmentation_names_the_body_of_geoms_and_sites():
+    """Types: 5 is mjOBJ_GEOM, 6 is mjOBJ_SITE, 9 is mjOBJ_LIGHT."""
+    found = np.array([[(-1, -1), (0, 5), (2, 5)], [(1, 6), (1, 9), (3, 5)]], np.int32)
+    image = np.empty((2, 3, 3), np.int32)
+    _core.add_bodies(found, np.array([0, 7, 4], np.int32), np.array([8, 2], np.int32), image)
+    assert image.tolist() == [[[-1, -1, -1], [0, 5, 0], [2, 5, 4]], [[1, 6, 2], [1, 9, -1], [3, 5, -1]]]
+    with pytest.raises(ValueError, match="must have the image's size"):
+        _core.add_bodies(found[:1], np.zeros(3, np.int32), np.zeros(2, np.int32), image)
