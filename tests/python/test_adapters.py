@@ -6,7 +6,8 @@ another robosuite, build/mjlab, build/warp, build/molmospaces, build/mitsuba and
 MJSENSE_TEST_ADAPTERS=adapters,libero,mjlab,warp,molmospaces,mitsuba,programs makes them; build/molmospaces uses the torch of
 build/mjlab, because the one that molmo-spaces requires takes several GB.
 MJSENSE_TEST_PROGRAMS is a folder with checkouts of google-deepmind/mujoco, google-deepmind/mujoco_warp, google-deepmind/dm_control,
-tonyzhaozh/act and kevinzakka/mink, whose programs are run, and of mjlab, of a state with tests/test_foot_height_sensor.py.
+tonyzhaozh/act and kevinzakka/mink, whose programs are run, and of mjlab, of a state with tests/test_foot_height_sensor.py, and
+allenai/molmospaces, whose tests are run.
 """
 
 import os
@@ -45,7 +46,7 @@ PACKAGES = {
         "nanobind-backend>=1.0",
         "PyOpenGL",
     ),
-    "mjlab": ("mjlab==1.6.0", "gymnasium==1.4.0", "h5py", "nanobind-backend>=1.0"),
+    "mjlab": ("mjlab==1.6.0", "gymnasium==1.4.0", "h5py", "nanobind-backend>=1.0", "pytest"),
     "warp": ("mujoco==4.0.0", "mujoco-warp==4.0.0", "gymnasium==1.4.0", "nanobind-backend>=1.0"),
     "molmospaces": (
         "mujoco==3.5.0",
@@ -219,21 +220,42 @@ def test_sensor_tests_of_mjlab(environment, tmp_path):
         text = (folder / f"{name}.py").read_text()
         (tmp_path / f"{name}.py").write_text(re.sub(r"\b(from|import) mjlab\b(?!\.envs|\.tasks)", r"\1 mjsense.compat.mjlab", text))
     (tmp_path / "fixtures").symlink_to(folder / "fixtures")
-    report = tmp_path / "report.xml"
-    path = Path(mjsense.__file__).parents[1]
-    words = [environment("mjlab"), "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=short", f"--junit-xml={report}", tmp_path]
-    done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(path)})
-    cases = [*ElementTree.parse(report).iter("testcase")]
-    failed = {case.get("name") for case in cases if case.find("failure") is not None or case.find("error") is not None}
+    results, text = results_of_tests(environment("mjlab"), tmp_path, tmp_path)
+    failed = {case.split("::")[1] for case, result in results.items() if result in ("failure", "error")}
     listed = (ROOT / "docs/mjlab.md").read_text().split("### Tests of mjlab's sensors")[1].split("\n#")[0]
-    assert failed == {*re.findall(r"^\| `(test_\w+)`", listed, re.M)}, done.stdout[-5000:]
-    assert len(cases) - len(failed) > 80
+    assert failed == {*re.findall(r"^\| `(test_\w+)`", listed, re.M)}, text
+    assert len(results) - len(failed) > 80
+
+
+def results_of_tests(python, tests, tmp_path, *options):
+    """``passed``, ``failure``, ``error`` or ``skipped`` by the class and name of each test, and the last lines that pytest printed."""
+    report = tmp_path / "report.xml"
+    path = os.pathsep.join([str(Path(mjsense.__file__).parents[1]), str(tmp_path)])
+    words = [python, "-W", "ignore", "-m", "pytest", "-q", "-p", "no:cacheprovider", "--tb=short", f"--junit-xml={report}", *options, tests]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=tests, env={**os.environ, "PYTHONPATH": path})
+    results = {}
+    for case in ElementTree.parse(report).iter("testcase"):
+        kinds = {child.tag for child in case} & {"failure", "error", "skipped"}
+        results[f"{case.get('classname')}::{case.get('name')}"] = kinds.pop() if kinds else "passed"
+    return results, done.stdout[-5000:]
 
 
 @pytest.mark.parametrize("script", ["molmospaces_use", "molmospaces_images"])
 def test_molmospaces(environment, script, tmp_path, monkeypatch):
     monkeypatch.setenv("MLSPACES_ASSETS_DIR", str(tmp_path))
     run(environment("molmospaces"), Path(__file__).parent / f"adapters/{script}.py", ROOT / "docs/drop_in/molmospaces.md")
+
+
+def test_tests_of_molmospaces(environment, tmp_path, monkeypatch):
+    """Those that pass without mjsense pass with it. The others need robots and scenes that they download."""
+    monkeypatch.setenv("MLSPACES_ASSETS_DIR", str(tmp_path))
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    (tmp_path / "with_mjsense.py").write_text("import mjsense.compat.molmospaces\n\nmjsense.compat.molmospaces.use()\n")
+    tests = checkout("molmospaces/mlspaces_tests/component_tests")
+    without, _ = results_of_tests(environment("molmospaces"), tests, tmp_path)
+    found, text = results_of_tests(environment("molmospaces"), tests, tmp_path, "-p", "with_mjsense")
+    assert found == without, text
+    assert [*found.values()].count("passed") >= 26
 
 
 def test_benchmarks_of_molmospaces(environment, tmp_path):
