@@ -95,6 +95,15 @@ def test_a_damaged_value_stays_visible(root, tmp_path):
     assert done.returncode == 1 and "tcp_pose differs from what was recorded" in done.stdout
 
 
+def test_an_attribute_that_is_never_recorded_is_refused(root, tmp_path):
+    shutil.copytree(root / "house_4", tmp_path / "data/house_4")
+    with h5py.File(next((tmp_path / "data").glob("*/*.h5")), "a") as file:
+        file.attrs["reference"] = file["traj_0"].ref
+    with pytest.raises(ValueError, match=r"\.h5: the attribute 'reference' is neither a text nor numbers"):
+        mjs.delete_episodes(tmp_path / "data", tmp_path / "out", [0])
+    assert not (tmp_path / "out").exists()
+
+
 def test_errors(root, tmp_path):
     out = tmp_path / "out"
     for call, message in (

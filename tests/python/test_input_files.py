@@ -41,6 +41,9 @@ def test_a_wrong_file_is_named_with_what_is_wrong(name, tmp_path):
     if "TOML" in of_another_kind:
         with pytest.raises(ValueError, match=r"/binary\.toml: not a text file in UTF-8: invalid byte at position 0$"):
             read(tmp_path / "binary.toml")
+        (tmp_path / "deep.toml").write_text("a = " + "[" * 5000)
+        with pytest.raises(ValueError, match=r"/deep\.toml: not valid TOML: it is nested too deeply$"):
+            read(tmp_path / "deep.toml")
     if name != "recording":  # it may be a directory
         with pytest.raises(IsADirectoryError, match=r": is a directory, not a file$"):
             read(tmp_path)

@@ -2,6 +2,7 @@
 """Footers of Parquet files; pyarrow ends the process when it reads some damaged ones."""
 
 import contextlib
+import gzip
 import io
 import struct
 from pathlib import Path
@@ -35,7 +36,7 @@ def test_the_footer_says_what_pyarrow_says(tmp_path, codec):
     with open(path, "rb") as file:
         footer = parquet_footer.read(path, file)
     assert (footer.rows, footer.values) == (5, sum(column.num_values for column in columns)) and len(groups) == 3
-    assert footer.bytes == sum(group.total_byte_size for group in groups)
+    assert footer.bytes == sum(column.total_uncompressed_size for column in columns)
     assert footer.codecs == {column.compression.replace("LZ4", "LZ4_RAW") for column in columns}
 
 
@@ -75,3 +76,46 @@ def test_a_footer_is_not_larger_in_memory_than_columns_need(monkeypatch, content
     with pytest.raises(ValueError, match=r"^x: not a Parquet file that can be read: its footer is damaged$"):
         parquet_footer.read(Path("x"), footer(content))
     assert len(read) < 10_100
+
+
+def varint(number):
+    out = b""
+    while number > 127:
+        out, number = out + bytes([number & 127 | 128]), number >> 7
+    return out + bytes([number])
+
+
+def with_page(path, packed, unpacked, stated):
+    """A file of one column whose only page has these packed bytes, the size `unpacked` in its header and `stated` in the footer."""
+    schema = pa.schema([pa.field("x", pa.int64(), nullable=False)])
+    pq.write_table(pa.table({"x": np.arange(1000)}, schema), path, compression="GZIP", use_dictionary=False, write_statistics=False)
+    content, column = path.read_bytes(), pq.read_metadata(path).row_group(0).column(0)
+    begin, size = column.data_page_offset, column.total_compressed_size
+    end = content[begin : begin + size].index(b"\x1f\x8b")  # of the header
+    head = content[begin : begin + end]
+    sizes = [varint(2 * n) for n in (column.total_uncompressed_size - end, size - end)]
+    page = head.replace(b"\x15" + sizes[0] + b"\x15" + sizes[1], b"\x15" + varint(2 * unpacked) + b"\x15" + varint(2 * len(packed)))
+    about = content[begin + size : -8]
+    old = b"\x16" + varint(2 * column.total_uncompressed_size) + b"\x16" + varint(2 * size)
+    assert about.count(old) == 1 and page != head
+    about = about.replace(old, b"\x16" + varint(2 * stated) + b"\x16" + varint(2 * (len(page) + len(packed))))
+    path.write_bytes(content[:begin] + page + packed + about + struct.pack("<I", len(about)) + b"PAR1")
+
+
+def test_a_page_is_not_larger_than_the_footer_states(tmp_path):
+    """Before, a file of 1 MB that stated 8 kB made Arrow unpack a page of 1 GB."""
+    path, size = tmp_path / "x.parquet", 1 << 20
+    data = np.arange(1000).tobytes()
+    with_page(path, gzip.compress(data + bytes(size - len(data))), size, size + 100)
+    with open(path, "rb") as file:
+        assert parquet_footer.read(path, file).bytes == size + 100
+    assert pq.read_table(path)["x"].to_pylist()[-1] == 999
+    with_page(path, gzip.compress(data + bytes(size - len(data))), size, size - 1)
+    with open(path, "rb") as file, pytest.raises(ValueError, match="its pages are larger than its footer states"):
+        parquet_footer.read(path, file)
+    with_page(path, b"", size, 0)
+    changed = bytearray(path.read_bytes())
+    changed[4:8] = b"\xff" * 4
+    path.write_bytes(changed)
+    with open(path, "rb") as file, pytest.raises(ValueError, match="the header of a page is damaged"):
+        parquet_footer.read(path, file)

@@ -17,7 +17,7 @@ from mjsense.core.optional import optional
 from mjsense.dataset.dataset import Dataset
 from mjsense.dataset.episode import Episode
 from mjsense.dataset.hdf5 import open_h5
-from mjsense.dataset.hdf5_values import text_of
+from mjsense.dataset.hdf5_values import Attributes, text_of
 from mjsense.dataset.places import open_plain, plain_name
 from mjsense.dataset.streams import VIDEOS
 
@@ -150,8 +150,9 @@ def _copy_batch(source: Path, episodes: list[Episode], target: Path) -> None:
         return
     h5py = optional("h5py", "dataset", "Editing recordings")
     with open_plain(source) as plain, h5py.File(f"/proc/self/fd/{plain.fileno()}", "r") as old, h5py.File(target, "w") as new:
-        for name, value in old.attrs.items():
-            new.attrs[name] = value
+        attributes = Attributes(old, str(source))
+        for name in old.attrs:
+            new.attrs[name] = attributes[name]
         for k, episode in enumerate(episodes):
             old.copy(episode.trajectory, new, f"traj_{k}")
     _seal(target)

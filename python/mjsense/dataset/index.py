@@ -20,6 +20,7 @@ _TEXTS = {"path": 256, "trajectory": 32, "outcome": TEXT_BYTES, "task": TEXT_BYT
 _NUMBERS = {"episode": (0, 2**53), "length": (0, STEPS), "seed": (0, 2**64 - 1)}
 """Columns of whole numbers, and their bounds."""
 _PACKED = ("UNCOMPRESSED", "SNAPPY")  # others can have a ratio of thousands
+_TABLE_BYTES = 1 << 30
 _ROWS = 4096  # at a time
 _BATCH_BYTES = 1 << 28  # of the texts of so many rows
 
@@ -37,6 +38,8 @@ def rows_of(path: Path) -> list[dict[str, Any]]:
             footer = parquet_footer.read(path, plain)
             if footer.rows > EPISODES:
                 raise ValueError(f"{path} has {footer.rows} rows, more than {EPISODES}")
+            if footer.bytes > _TABLE_BYTES:
+                raise ValueError(f"{path} has {footer.bytes} bytes when it is unpacked, more than {_TABLE_BYTES}")
             if other := footer.codecs - set(_PACKED):
                 raise ValueError(f"{path} is packed with {min(other)}; it must be {' or '.join(_PACKED)}")
             plain.seek(0)

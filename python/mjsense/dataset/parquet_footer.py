@@ -1,22 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the footer of a Parquet file says about its size and compression.
+"""What a Parquet file says about its size and compression, in its footer and in the headers of its pages.
 
-pyarrow 26 ends the process, instead of raising an error, when it returns a column of a damaged footer. Format:
-https://github.com/apache/parquet-format, and the compact protocol of Apache Thrift.
+pyarrow 26 ends the process, instead of raising an error, when it returns a column of a damaged footer, and unpacks a page to the
+size in its header, which can be another than that in the footer. Format: https://github.com/apache/parquet-format, and the
+compact protocol of Apache Thrift.
 """
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 _FOOTER_BYTES = 1 << 26
 _MAX_DEPTH = 32
 _MAX_VALUES = 2_000_000  # a column of a row group has about 30; reading a million takes a second and 70 MB
-# Fields of FileMetaData, RowGroup, ColumnChunk and ColumnMetaData.
-_NUM_ROWS, _ROW_GROUPS, _COLUMNS, _TOTAL_BYTE_SIZE, _META_DATA, _CODEC, _NUM_VALUES = 3, 4, 1, 2, 3, 4, 5
+_HEADER_BYTES = (1 << 10, 1 << 16)  # usual and most bytes of a page's header
+_MAX_HEADERS = 1 << 22  # of all of them; a header has about 40
+# Fields of FileMetaData, RowGroup, ColumnChunk, ColumnMetaData and PageHeader.
+_NUM_ROWS, _ROW_GROUPS, _COLUMNS, _META_DATA, _CODEC, _NUM_VALUES = 3, 4, 1, 3, 4, 5
+_UNPACKED, _PACKED, _DATA_PAGE, _DICTIONARY_PAGE = 6, 7, 9, 11
+_PAGE_UNPACKED, _PAGE_PACKED = 2, 3
 _CODECS = ("UNCOMPRESSED", "SNAPPY", "GZIP", "LZO", "BROTLI", "LZ4", "ZSTD", "LZ4_RAW")
 
 
@@ -32,10 +38,10 @@ class Footer:
 
 
 def read(path: Path, file: BinaryIO) -> Footer:
-    """The footer of a file that is open at any position. ``path`` is for errors.
+    """The footer of a file that is open at any position, after its pages have been compared with it. ``path`` is for errors.
 
     Raises:
-        ValueError: The footer is damaged.
+        ValueError: The footer is damaged, or a page has another size than it states.
     """
     try:
         size = file.seek(0, 2)
@@ -47,13 +53,57 @@ def read(path: Path, file: BinaryIO) -> Footer:
         table = _Reader(file.read(length)).fields(0)
         groups = table[_ROW_GROUPS]
         columns = [column[_META_DATA] for group in groups for column in group[_COLUMNS]]
-        values, sizes = [column[_NUM_VALUES] for column in columns], [group[_TOTAL_BYTE_SIZE] for group in groups]
+        values, sizes = [column[_NUM_VALUES] for column in columns], [column[_UNPACKED] for column in columns]
         codecs = {column[_CODEC] for column in columns}
         if min(table[_NUM_ROWS], *values, *sizes, *codecs, 0) < 0:
             raise ValueError
-        return Footer(table[_NUM_ROWS], sum(values), sum(sizes), frozenset(_CODECS[codec] for codec in codecs))
+        footer = Footer(table[_NUM_ROWS], sum(values), sum(sizes), frozenset(_CODECS[codec] for codec in codecs))
+        places = [
+            (min(column[_DATA_PAGE], column.get(_DICTIONARY_PAGE) or size), column[_PACKED], column[_UNPACKED])
+            for column in columns
+        ]
+        if any(begin < 0 or packed < 0 or begin + packed > size for begin, packed, _ in places):
+            raise ValueError
     except (ValueError, TypeError, LookupError, struct.error):
         raise ValueError(f"{path}: not a Parquet file that can be read: its footer is damaged") from None
+    parsed = 0
+    for begin, packed, unpacked in places:
+        for page in _pages(path, file, begin, begin + packed):
+            unpacked -= page.unpacked
+            parsed += page.header
+            if unpacked < 0:
+                raise ValueError(f"{path}: not a Parquet file that can be read: its pages are larger than its footer states")
+            if parsed > _MAX_HEADERS:
+                raise ValueError(f"{path}: the headers of its pages have more than {_MAX_HEADERS} bytes")
+    return footer
+
+
+class _Page(NamedTuple):
+    header: int
+    """Bytes of the header."""
+    packed: int
+    unpacked: int
+
+
+def _pages(path: Path, file: BinaryIO, at: int, end: int) -> Iterator[_Page]:
+    """The pages of a column between two places of the file."""
+    while at < end:
+        page = next(filter(None, (_page(file, at, min(most, end - at)) for most in _HEADER_BYTES)), None)
+        if page is None or min(page.packed, page.unpacked) < 0 or page.header + page.packed > end - at:
+            raise ValueError(f"{path}: not a Parquet file that can be read: the header of a page is damaged")
+        yield page
+        at += page.header + page.packed
+
+
+def _page(file: BinaryIO, at: int, most: int) -> _Page | None:
+    """None if the header is damaged or has more bytes."""
+    file.seek(at)
+    reader = _Reader(file.read(most))
+    try:
+        header = reader.fields(0)
+        return _Page(reader.at, int(header[_PAGE_PACKED]), int(header[_PAGE_UNPACKED]))
+    except (ValueError, TypeError, LookupError):
+        return None
 
 
 class _Reader:
@@ -61,6 +111,11 @@ class _Reader:
 
     def __init__(self, data: bytes) -> None:
         self._data, self._at, self._values = data, 0, 0
+
+    @property
+    def at(self) -> int:
+        """Number of bytes that have been read."""
+        return self._at
 
     def _byte(self) -> int:
         self._at += 1
