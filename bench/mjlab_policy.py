@@ -5,8 +5,8 @@
 
 The curve is that of the run's event file (--agent.logger tensorboard): the mean reward of an episode at eleven times. The policy
 then plays 64 environments for 1,000 steps with mjlab's settings for play, without exploration. Printed are the reward of a
-second, how many episodes ended early, and for tasks with a commanded velocity the mean difference of the velocity from the
-command, and the mean command. The video, drawn by mjsense, shows the first 10 s. The environment build/mjlab is that of
+second, how many episodes ended early, for tasks with a commanded velocity the mean difference of the velocity from the command, and
+the mean command, and for tasks that lift an object in how many environments it came to its goal. The video, drawn by mjsense, shows the first 10 s. The environment build/mjlab is that of
 tests/python/test_adapters.py; PYTHONPATH names the folder of the build.
 """
 
@@ -76,15 +76,18 @@ def main() -> None:
     runner.load(str(checkpoint), load_cfg={"actor": True}, strict=True, map_location="cpu")
     policy = runner.get_inference_policy(device="cpu")
 
-    frames, rewards, ended, errors = [], [], 0, []
+    frames, rewards, ended, errors, terms = [], [], 0, [], raw.command_manager.active_terms
+    reached = torch.zeros(ENVIRONMENTS)
     observation = env.get_observations()
     for step in range(STEPS):
         with torch.no_grad():
             observation, reward, done, extras = env.step(policy(observation))
         rewards.append(reward.mean().item())
         ended += int((done.bool() & ~extras["time_outs"].bool()).sum()) if "time_outs" in extras else int(done.sum())
-        if "twist" in raw.command_manager.active_terms:
+        if "twist" in terms:
             errors.append(velocity_errors(raw))
+        if "lift_height" in terms:
+            reached = torch.maximum(reached, raw.command_manager.get_term("lift_height").metrics["at_goal"])
         if arguments.video and step * raw.step_dt < VIDEO_SECONDS:
             frames.append(raw.render())
     seconds = STEPS * raw.step_dt
@@ -94,6 +97,8 @@ def main() -> None:
         along, about, *commands = np.mean(errors, axis=0)
         print(f"difference along x and y: {along:.2f} m/s, where {commands[0]:.2f} are commanded")
         print(f"difference about z: {about:.2f} rad/s, where {commands[1]:.2f} are commanded")
+    if "lift_height" in terms:
+        print(f"the object came to its goal in {int(reached.sum())} of {ENVIRONMENTS} environments")
     if arguments.video:
         mediapy.write_video(arguments.video, frames, fps=1 / raw.step_dt)
 

@@ -81,32 +81,43 @@ class LeRobotReader:
         self._read: tuple[Path, Any] = Path(), None
 
     def _table(self, path: Path, wanted: Callable[[str], bool] = lambda _: True) -> Any:
-        """The wanted columns of a Parquet file. A text is stored once, however many rows have it, so the bytes of all rows are
-        counted before rows are made of them."""
-        place, arrow = foreign.regular_inside((self.root,), path, str(path)), _needs("pyarrow")
+        """The wanted columns of a Parquet file."""
+        place = foreign.regular_inside((self.root,), path, str(path))
         try:
             with foreign.open_file(place, str(path)) as plain:
-                footer = parquet_footer.read(path, plain)
-                if footer.rows > foreign.MAX_ROWS or footer.values > _MAX_VALUES or footer.bytes > _MAX_TABLE:
-                    raise ValueError(
-                        f"{path}: has {counted(footer.rows, 'row')}, {counted(footer.values, 'value')} and {footer.bytes} bytes, "
-                        f"the limits are {foreign.MAX_ROWS}, {_MAX_VALUES} and {_MAX_TABLE}"
-                    )
-                schema = self._tables.ParquetFile(arrow.PythonFile(plain, "r")).schema
-                columns = [schema.column(i) for i in range(len(schema))]
-                if long := [column.path for column in columns if column.length > _MAX_FIXED]:
-                    raise ValueError(f"{path}: the column {foreign.found(long[0])} has values of more than {_MAX_FIXED} bytes")
-                texts = [column.path for column in columns if column.physical_type == "BYTE_ARRAY"]
-                file = self._tables.ParquetFile(arrow.PythonFile(plain, "r"), read_dictionary=texts)
-                names, parts, size = [name for name in file.schema_arrow.names if wanted(name)], [], 0
-                for group in range(file.num_row_groups):  # each has dictionaries of its own
-                    parts.append(file.read_row_group(group, names))
-                    size += sum(_bytes_of(part) for column in parts[-1].columns for part in column.chunks)
-                    if size > _MAX_TABLE:
-                        raise ValueError(f"{path}: its rows have more than {_MAX_TABLE} bytes, which is the limit")
-                return arrow.concat_tables(parts) if parts else file.schema_arrow.empty_table().select(names)
+                texts = self._checked_texts(path, plain)
+                return self._rows(path, plain, texts, wanted)
         except Exception as error:  # pyarrow's errors have no common base class
             raise self._damaged(path, error) from None
+
+    def _checked_texts(self, path: Path, plain: Any) -> list[str]:
+        """The columns of texts, after the sizes of all columns have been checked."""
+        footer = parquet_footer.read(path, plain)
+        if footer.rows > foreign.MAX_ROWS or footer.values > _MAX_VALUES or footer.bytes > _MAX_TABLE:
+            raise ValueError(
+                f"{path}: has {counted(footer.rows, 'row')}, {counted(footer.values, 'value')} and {footer.bytes} bytes, "
+                f"the limits are {foreign.MAX_ROWS}, {_MAX_VALUES} and {_MAX_TABLE}"
+            )
+        schema = self._opened(plain).schema
+        columns = [schema.column(i) for i in range(len(schema))]
+        if long := [column.path for column in columns if column.length > _MAX_FIXED]:
+            raise ValueError(f"{path}: the column {foreign.found(long[0])} has values of more than {_MAX_FIXED} bytes")
+        return [column.path for column in columns if column.physical_type == "BYTE_ARRAY"]
+
+    def _rows(self, path: Path, plain: Any, texts: list[str], wanted: Callable[[str], bool]) -> Any:
+        """The wanted columns. A text is stored once, however many rows have it, so the bytes of all rows are counted before rows
+        are made of them."""
+        file = self._opened(plain, read_dictionary=texts)
+        names, parts, size = [name for name in file.schema_arrow.names if wanted(name)], [], 0
+        for group in range(file.num_row_groups):  # each has dictionaries of its own
+            parts.append(file.read_row_group(group, names))
+            size += sum(_bytes_of(part) for column in parts[-1].columns for part in column.chunks)
+            if size > _MAX_TABLE:
+                raise ValueError(f"{path}: its rows have more than {_MAX_TABLE} bytes, which is the limit")
+        return _needs("pyarrow").concat_tables(parts) if parts else file.schema_arrow.empty_table().select(names)
+
+    def _opened(self, plain: Any, **options: Any) -> Any:
+        return self._tables.ParquetFile(_needs("pyarrow").PythonFile(plain, "r"), **options)
 
     def _damaged(self, path: Path, error: Exception) -> Exception:
         if isinstance(error, OSError) and not path.exists():
