@@ -80,7 +80,8 @@ class PyForeignArrays {
       std::tuple<int, int, int, std::optional<std::array<float, 4>>, std::array<std::uintptr_t, 3>>;
 
   void render(const std::vector<Camera>& given, const std::array<std::size_t, 3>& rows,
-              unsigned groups, bool textures, bool shadows, bool skybox, std::uint32_t background) {
+              unsigned groups, bool textures, bool shadows, bool skybox, std::uint32_t background,
+              bool series_4, bool vertex_normals, float share_in_shadow) {
     std::vector<render::ForeignCamera> cameras;
     for (const auto& [id, width, height, pixels, arrays] : given) {
       render::ForeignCamera& camera = cameras.emplace_back();
@@ -94,7 +95,8 @@ class PyForeignArrays {
       camera.depth = reinterpret_cast<float*>(arrays[1]);
       camera.segmentation = reinterpret_cast<std::int32_t*>(arrays[2]);
     }
-    const render::ForeignImagesOptions options{groups, textures, shadows, skybox};
+    const render::ForeignImagesOptions options{
+        groups, textures, shadows, {true, series_4, vertex_normals, share_in_shadow, skybox}};
     work([&](worlds::ForeignArrays& own) {
       own.take_poses();
       if (!rays_) rays_ = make_shared_guarded<rays::ForeignRays>(own.worlds());
@@ -151,7 +153,8 @@ void bind_foreign_arrays(nb::module_& m) {
            "distances, geoms and normals. hidden: a byte for each geom.")
       .def("render", &PyForeignArrays::render, nb::arg("cameras"), nb::arg("rows"),
            nb::arg("groups"), nb::arg("textures"), nb::arg("shadows"), nb::arg("skybox"),
-           nb::arg("background"),
+           nb::arg("background"), nb::arg("series_4"), nb::arg("vertex_normals"),
+           nb::arg("share_in_shadow"),
            "Draws images. cameras: id, width, height, (left, top, dx, dy) or None, addresses of "
            "rgb, "
            "depth and segmentation of world 0. rows: numbers from one world to the next in them.")

@@ -16,8 +16,8 @@ _ON = ("use_ambient_lighting", "enable_backface_culling", "enable_specular", "en
 
 def reason_to_leave(model: Any, source: Any, rc: Any) -> str:
     """Why images of this context are mujoco_warp's own; empty if mjsense draws them. `source`: the ``MjModel``."""
-    if hasattr(rc, "samples_per_pixel"):
-        return "mujoco_warp 4.0 shades in another way than 3.11"
+    if getattr(rc, "samples_per_pixel", 1) > 1:
+        return "a pixel has several samples"
     off = [name for name in _ON if not getattr(rc, name, True)]
     if off:
         return f"{off[0]} is False"
@@ -39,6 +39,12 @@ def reason_to_leave(model: Any, source: Any, rc: Any) -> str:
     if not np.array_equal(np.sort(drawn), np.flatnonzero(np.isin(source.geom_group, groups))):
         return "its geoms are not those of whole groups"
     return ""
+
+
+def look_of(rc: Any) -> tuple[bool, bool, float]:
+    """Whether the context is that of mujoco_warp 4.0, whether meshes have vertex normals, and the share of light in shadows."""
+    series_4 = hasattr(rc, "shadow_light_fraction")
+    return series_4, series_4 and bool(rc.enable_vertex_normals), float(getattr(rc, "shadow_light_fraction", 0.3))
 
 
 def geom_groups(source: Any, rc: Any) -> list[int]:

@@ -216,6 +216,7 @@ class Worlds:
         rc.seg_data.numpy()[...] = -1
         groups = sum(1 << group for group in _warp_rendering.geom_groups(self._source, rc))
         settings = (bool(rc.use_textures), bool(rc.use_shadows), bool(rc.render_skybox), int(rc.background_color))
+        settings += _warp_rendering.look_of(rc)
         cameras = _warp_rendering.cameras_of(rc)
         if cameras:
             self._arrays.render(cameras, _warp_rendering.row_lengths(rc), groups, *settings)

@@ -12,13 +12,13 @@ namespace {
 // If there are fewer images per thread than this, images are divided into bands.
 constexpr int kImagesPerThread = 4, kBandsPerThread = 8;
 
-ViewOptions view_options(const ForeignImagesOptions& options) {
+ViewOptions view_options(const ForeignImagesOptions& options, const mjModel* m) {
   ViewOptions view;
   view.groups = options.groups;
   view.textures = options.textures;
   view.shadows = options.shadows;
-  view.as_mujoco_warp = true;
-  view.warp_skybox = options.skybox;
+  view.warp = options.look;
+  if (options.look.series_4) view.far = static_cast<float>(m->vis.map.zfar * m->stat.extent);
   return view;
 }
 
@@ -26,13 +26,15 @@ ViewOptions view_options(const ForeignImagesOptions& options) {
 
 ForeignImages::ForeignImages(const worlds::Worlds& worlds, const ForeignImagesOptions& options)
     : options_(options),
-      assets_(worlds.model(), true, options.textures || options.skybox, true),
-      appearances_(worlds.size(), Appearance(worlds.model(), kMaxLights, true)) {
+      assets_(worlds.model(), true, options.textures || options.look.skybox, options.look),
+      appearances_(worlds.size(), Appearance(worlds.model(), kMaxLights, options.look)) {
   const auto geoms = static_cast<int>(ViewBuilder::max_geoms(worlds.model()));
   threads_.reserve(worlds.threads());
   for (int i = 0; i < worlds.threads(); ++i)
-    threads_.push_back(
-        {ViewBuilder(worlds.model(), assets_, view_options(options)), TileMemory(geoms), {}, {}});
+    threads_.push_back({ViewBuilder(worlds.model(), assets_, view_options(options, worlds.model())),
+                        TileMemory(geoms),
+                        {},
+                        {}});
 }
 
 void ForeignImages::render(worlds::Worlds& worlds, rays::ForeignRays& rays,

@@ -30,7 +30,8 @@ struct ForeignCamera {
 
 struct ForeignImagesOptions {
   unsigned groups = 0x7;  // bit g: geoms of group g are drawn
-  bool textures = true, shadows = false, skybox = false;
+  bool textures = true, shadows = false;
+  WarpLook look;
 
   bool operator==(const ForeignImagesOptions&) const = default;
 };

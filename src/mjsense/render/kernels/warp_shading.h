@@ -12,7 +12,6 @@
 namespace mjsense::render {
 namespace {
 
-constexpr float kShareInShadow = 0.3f;
 // mujoco_warp truncates colours to 8 bits, and the images here are rounded.
 constexpr float kTruncated = 0.499f / 255;
 
@@ -32,8 +31,8 @@ inline void shade_as_mujoco_warp(const View& view, const Surfaces& s, const Hits
         shadows && light.casts_shadows ? dark_lanes(view, i, lit, s, hits, lanes, *shadows) : 0;
     for (int k = 0; k < kLanes; k += kWidth) {
       const LightTerm& term = lit.terms[k / kWidth];
-      const Float scale =
-          term.scale * select(mask_of(dark >> k & kAllLanes), splat(kShareInShadow), splat(1.0f));
+      const Float scale = term.scale * select(mask_of(dark >> k & kAllLanes),
+                                              splat(view.warp.share_in_shadow), splat(1.0f));
       const Float matte = scale * term.diffuse;
       const Float shine = scale * highlight(term, s, eye, k, lanes) * load(s.specular + k);
       for (int c = 0; c < 3; ++c) {

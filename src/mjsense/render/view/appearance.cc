@@ -26,9 +26,9 @@ bool is_black(const ViewLight& light) {
 
 }  // namespace
 
-Appearance::Appearance(const mjModel* m, int max_lights, bool as_mujoco_warp)
+Appearance::Appearance(const mjModel* m, int max_lights, const WarpLook& warp)
     : max_lights_(max_lights),
-      as_mujoco_warp_(as_mujoco_warp),
+      warp_(warp),
       flex_parts_(rays::flex_parts(m)),
       rgba_(4 * (m->ngeom + flex_parts_.size() + m->nskin)),
       materials_(m->nmat),
@@ -61,19 +61,21 @@ void Appearance::copy(const mjModel* m) {
                      .repeat = {m->mat_texrepeat[2 * i], m->mat_texrepeat[2 * i + 1]},
                      .uniform = m->mat_texuniform[i] != 0,
                      .textures = textures_of(m, i)};
-  if (as_mujoco_warp_) copy_warp_colors(m);
+  if (warp_.on) apply_warp_look(m);
   sky_.distance = static_cast<float>(0.7 * m->vis.map.zfar * m->stat.extent);
   sky_.haze_width = m->vis.map.haze;
   std::copy_n(m->vis.rgba.haze, 3, sky_.haze_rgb);
   copy_lights(m);
 }
 
-void Appearance::copy_warp_colors(const mjModel* m) {
+void Appearance::apply_warp_look(const mjModel* m) {
   for (int i = 0; i < m->ngeom; ++i) {
-    const int material = m->geom_matid[i];
-    const float* rgba = material < 0 ? m->geom_rgba + 4 * i : m->mat_rgba + 4 * material;
-    std::copy_n(rgba, 3, &rgba_[4 * i]);
-    rgba_[4 * i + 3] = 1;
+    float* rgba = &rgba_[4 * i];
+    if (!warp_.series_4) {
+      const int material = m->geom_matid[i];
+      std::copy_n(material < 0 ? m->geom_rgba + 4 * i : m->mat_rgba + 4 * material, 3, rgba);
+    }
+    if (!warp_.series_4 || rgba[3] != 0) rgba[3] = 1;
   }
   for (Material& material : materials_) material.reflectance = 0;
 }

@@ -11,6 +11,7 @@
 #include "mjsense/render/light/material.h"
 #include "mjsense/render/view/texture_maps.h"
 #include "mjsense/render/view/view_light.h"
+#include "mjsense/render/view/warp_look.h"
 
 namespace mjsense::render {
 
@@ -36,10 +37,9 @@ inline constexpr int kClassicLights = 8;
 class Appearance {
  public:
   // max_lights: maximum number of active lights that are used, counting the headlight first; at
-  // most kMaxLights. as_mujoco_warp: geoms have the colours of their materials, without
-  // transparency and reflections.
+  // most kMaxLights. warp: geoms are opaque, without reflections.
   explicit Appearance(const mjModel* model, int max_lights = kClassicLights,
-                      bool as_mujoco_warp = false);
+                      const WarpLook& warp = {});
   void copy(const mjModel* model);  // no allocation
 
   // [geoms, then parts of flexes, then skins; 4], resolved as by MuJoCo's visualiser
@@ -57,11 +57,11 @@ class Appearance {
   const Rgb64& environment_tint() const { return environment_tint_; }
 
  private:
-  void copy_warp_colors(const mjModel* model);
+  void apply_warp_look(const mjModel* model);
   void copy_lights(const mjModel* model);
 
   int max_lights_;
-  bool as_mujoco_warp_;
+  WarpLook warp_;
   std::vector<rays::FlexPart> flex_parts_;
   std::vector<float> rgba_;
   std::vector<Material> materials_;

@@ -97,7 +97,7 @@ void set_uv_scale(const SurfaceStyle& style, const rays::RayGeom& source, const 
       }
     }
   }
-  if (style.as_mujoco_warp && g.type == mjGEOM_PLANE) {  // all planes are like infinite ones
+  if (style.planes_are_infinite && g.type == mjGEOM_PLANE) {
     for (int i = 0; i < 2; ++i) {
       const float size = std::max(g.size[i], 0.0f);
       s.uv_scale[i] = material.repeat[i] * (size > 0 ? size : 1);

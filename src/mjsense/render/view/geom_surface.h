@@ -19,7 +19,7 @@ struct SurfaceStyle {
   const SurfaceAssets* assets = nullptr;  // where the maps of materials are, unless Paint has them
   bool textures = true;
   bool physical = false;
-  bool as_mujoco_warp = false;
+  bool planes_are_infinite = false;  // as in mujoco_warp 3.11: for their textures
   bool projected_textures = false;   // DrawnScene::projected_textures
   bool sized_soft_textures = false;  // DrawnScene::sized_soft_textures
   float tint = 1;                    // factor of every colour

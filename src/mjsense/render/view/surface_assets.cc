@@ -31,7 +31,8 @@ void MeshTables::add_coordinates(const float* texcoord, std::span<const int> tex
     std::copy_n(texcoord + 2 * texcoords[i], 2, uvs.data() + 2 * i);
 }
 
-std::shared_ptr<const MeshTables> mesh_tables(const mjModel* m, int id, bool coordinates) {
+std::shared_ptr<const MeshTables> mesh_tables(const mjModel* m, int id, bool coordinates,
+                                              bool creases) {
   const int faces = m->mesh_facenum[id], first = m->mesh_faceadr[id];
   const bool has_uv = m->mesh_texcoordadr[id] >= 0;
   // The mesh's range of an array with `width` numbers per row.
@@ -50,7 +51,7 @@ std::shared_ptr<const MeshTables> mesh_tables(const mjModel* m, int id, bool coo
     texcoords = part(m->mesh_facetexcoord, first, faces, 3);
   }
   static ContentCache<MeshTables> all;
-  const bool form[] = {has_uv, coordinates};
+  const bool form[] = {has_uv, coordinates, creases};
   ContentKey key;
   key.add(std::span<const bool>(form));
   for (const auto& values : {vert, normal, texcoord}) key.add(values);
@@ -62,7 +63,7 @@ std::shared_ptr<const MeshTables> mesh_tables(const mjModel* m, int id, bool coo
     for (int f = 0; f < faces; ++f, out += 9) {
       const int *v = &vertices[3 * f], *n = &normals[3 * f];
       for (int k = 0; k < 3; ++k) std::copy_n(&normal[3 * n[k]], 3, out + 3 * k);
-      if (has_uv) continue;
+      if (has_uv && !creases) continue;
       float flat[3];
       const float length = cross(&vert[3 * v[0]], &vert[3 * v[1]], &vert[3 * v[2]], flat);
       for (float& x : flat) x = length > 0 ? x / length : 0;
@@ -89,7 +90,7 @@ void SurfaceAssets::keep(std::shared_ptr<const MeshTables> tables, MeshSurface& 
 }
 
 SurfaceAssets::SurfaceAssets(const mjModel* model, bool meshes, bool textures,
-                             bool as_mujoco_warp) {
+                             const WarpLook& warp) {
   textures_.resize(model->ntex);
   meshes_.resize(model->nmesh);
   skins_.resize(model->nskin);
@@ -101,10 +102,12 @@ SurfaceAssets::SurfaceAssets(const mjModel* model, bool meshes, bool textures,
     if (model->tex_type[i] == mjTEXTURE_SKYBOX && textures_[i].levels > 0 && !textures_[i].grey)
       skybox_ = &textures_[i];
   for (int i = 0; i < model->nmesh && meshes; ++i)
-    keep(mesh_tables(model, i, true), meshes_[i], model->mesh_vert + 3 * model->mesh_vertadr[i],
+    keep(mesh_tables(model, i, true, warp.on), meshes_[i],
+         model->mesh_vert + 3 * model->mesh_vertadr[i],
          model->mesh_face + 3 * model->mesh_faceadr[i]);
-  if (!as_mujoco_warp) return;
-  for (MeshSurface& mesh : meshes_) mesh.normals = nullptr;
+  if (!warp.on) return;
+  for (MeshSurface& mesh : meshes_)
+    if (!warp.vertex_normals) mesh.normals = nullptr;
   for (Texture& texture : textures_) texture.levels = std::min(texture.levels, 1);
 }
 

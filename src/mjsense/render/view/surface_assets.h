@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "mjsense/render/view/stored_texture.h"
+#include "mjsense/render/view/warp_look.h"
 
 namespace mjsense::render {
 
@@ -34,16 +35,18 @@ struct MeshTables {
 };
 
 // Tables of the model's mesh `id`, shared by all models of the process that have an equal mesh.
-// `coordinates`: also uvs, if the mesh has texture coordinates.
-std::shared_ptr<const MeshTables> mesh_tables(const mjModel* model, int id, bool coordinates);
+// `coordinates`: also uvs, if the mesh has texture coordinates. `creases`: also meshes with texture
+// coordinates are shaded flat at creases.
+std::shared_ptr<const MeshTables> mesh_tables(const mjModel* model, int id, bool coordinates,
+                                              bool creases = false);
 
 class SurfaceAssets {
  public:
   // `meshes`: prepare all meshes, including those that no geom uses, because a world may change a
   // geom's mesh or group. False for views that need no normals.
   // `model` must outlive this object, which refers to the positions and faces of its meshes.
-  // `as_mujoco_warp`: meshes have the normals of their faces, and textures no mipmaps.
-  SurfaceAssets(const mjModel* model, bool meshes, bool textures, bool as_mujoco_warp = false);
+  // `warp`: textures have no mipmaps.
+  SurfaceAssets(const mjModel* model, bool meshes, bool textures, const WarpLook& warp = {});
   SurfaceAssets(const SurfaceAssets&) = delete;
   SurfaceAssets& operator=(const SurfaceAssets&) = delete;
 

@@ -15,6 +15,7 @@
 #include "mjsense/render/view/pixel_grid.h"
 #include "mjsense/render/view/view_geom.h"
 #include "mjsense/render/view/view_light.h"
+#include "mjsense/render/view/warp_look.h"
 
 namespace mjsense::render {
 
@@ -41,6 +42,7 @@ struct Haze {
 struct WarpLight {
   bool on = false;
   float ambient[3] = {};  // of all lights together, which neither distance nor shadows reduce
+  float share_in_shadow = kWarpShareInShadow;
 
   bool operator==(const WarpLight&) const = default;
 };

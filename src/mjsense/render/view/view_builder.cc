@@ -24,7 +24,7 @@ ViewBuilder::ViewBuilder(const mjModel* model, const SurfaceAssets& assets,
       style_{.assets = &assets,
              .textures = options.textures,
              .physical = options.physical.on,
-             .as_mujoco_warp = options.as_mujoco_warp},
+             .planes_are_infinite = options.warp.on && !options.warp.series_4},
       geoms_(max_geoms(model) + options.markers),
       light_space_(options.shadows ? options.shadow_samples * model->nlight : 0, geoms_.capacity()),
       soft_surfaces_(assets.num_flex_parts() + model->nskin) {
@@ -39,8 +39,9 @@ ViewBuilder::ViewBuilder(const mjModel* model, const SurfaceAssets& assets,
   view_.near = options.near;
   view_.far = options.far;
   view_.shadows = options.shadows;
-  view_.warp.on = options.as_mujoco_warp;
-  const bool sky = options.as_mujoco_warp ? options.warp_skybox : options.textures;
+  view_.warp.on = options.warp.on;
+  view_.warp.share_in_shadow = options.warp.share_in_shadow;
+  const bool sky = options.warp.on ? options.warp.skybox : options.textures;
   view_.skybox = sky && !options.physical.hides_skybox ? assets.skybox() : nullptr;
   if (options.reflections && model->nmat > 0) {  // any world may set a material's reflectance
     ViewOptions flat = options;

@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "mjsense/render/view/physical_light.h"
+#include "mjsense/render/view/warp_look.h"
 
 namespace mjsense::render {
 
@@ -18,10 +19,7 @@ struct ViewOptions {
   float near = 0, far = 0;
   std::size_t markers = 0;       // maximum number of markers
   bool disable_culling = false;  // disables culling, for tests
-  // The light model, the textures of planes and the skybox are mujoco_warp's. For an Appearance and
-  // SurfaceAssets that are made so, too.
-  bool as_mujoco_warp = false;
-  bool warp_skybox = false;  // with as_mujoco_warp: a skybox, which hides no geoms
+  WarpLook warp;                 // for an Appearance and SurfaceAssets that are made with it, too
   PhysicalOptions physical;
 };
 
