@@ -9,8 +9,7 @@
 ``step``, ``forward``, ``step1``, ``step2``, ``reset_data``, ``set_const``, ``rays`` and ``render`` then compute all worlds with
 MuJoCo and mjsense, on all cores, if the arrays are on Warp's CPU device, and write the results into the arrays of the data, the
 model or the render context. On CUDA devices, and for models with callbacks or with ``opt.run_collision_detection=False``, they
-are mujoco_warp's own, as are images of mujoco_warp 4.0. All other functions are mujoco_warp's own everywhere, and read these
-arrays.
+are mujoco_warp's own. All other functions are mujoco_warp's own everywhere, and read these arrays.
 """
 
 from __future__ import annotations

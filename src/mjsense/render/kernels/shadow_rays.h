@@ -86,6 +86,8 @@ inline std::uint32_t shadow_of_geom(const View& view, int caster, const LightRay
     Mask barred;
     if (g.type == mjGEOM_PLANE) {
       barred = plane(g, o, d, true) < end;
+      // mujoco_warp sees planes from their front only.
+      if (view.warp.on) barred = barred & (d.z < splat(0.0f));
     } else {
       const Interval inside = solid(g, o, d);
       barred = (inside.enter < end) & (inside.exit > splat(1e-5f));
