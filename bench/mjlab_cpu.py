@@ -6,7 +6,8 @@ consist of.
 
 One process has both environments. After `--warm` steps with mjsense's physics, which bring both into the same states, each takes
 the same random actions. CPU time is that of all threads. Physics: step, forward, reset and set_const; sensing: rays and cameras;
-the rest: managers, contact sensors, rewards, observations. The environment build/mjlab is that of tests/python/test_adapters.py;
+the rest: managers, contact sensors, rewards, observations. The last column is the time on the clock of the physics of one
+environment step. The environment build/mjlab is that of tests/python/test_adapters.py;
 PYTHONPATH names the folder of the build, build/release/python.
 """
 
@@ -35,6 +36,7 @@ class Environment:
         cfg = load_env_cfg(task)
         cfg.scene.num_envs, cfg.seed = envs, 1
         self.spent = dict.fromkeys((*PARTS, "all"), 0.0)
+        self.clock = dict(self.spent)
         self.env: Any = ManagerBasedRlEnv(cfg=cfg, device="cpu")
         self.env.reset(seed=1)
         for part, names in PARTS.items():
@@ -43,9 +45,10 @@ class Environment:
 
     def timed(self, part: str, call: Any) -> Any:
         def run(*args: Any, **kwargs: Any) -> Any:
-            start = time.process_time()
+            start, begun = time.process_time(), time.perf_counter()
             result = call(*args, **kwargs)
             self.spent[part] += time.process_time() - start
+            self.clock[part] += time.perf_counter() - begun
             return result
 
         return run
@@ -73,9 +76,9 @@ def main() -> None:
     from mjsense.compat import mujoco_warp
 
     print(
-        "| task | environments | mjlab | mjsense | ratio | of these: physics | sensing | rest |\n"
+        "| task | environments | mjlab | mjsense | ratio | of these: physics | sensing | rest | physics, ms |\n"
         + "| --- "
-        + "| ---: " * 7
+        + "| ---: " * 8
         + "|"
     )
     for task in options.tasks:
@@ -88,7 +91,7 @@ def main() -> None:
                     ours.step(action)
             rates = []
             for one, steps in ((theirs, max(1, options.steps // 10)), (ours, options.steps)):
-                one.spent = dict.fromkeys(one.spent, 0.0)
+                one.spent, one.clock = dict.fromkeys(one.spent, 0.0), dict.fromkeys(one.spent, 0.0)
                 with mujoco_warp.used(options.threads) if one is ours else torch.no_grad():
                     for action in actions[options.warm :][:steps]:
                         one.step(action)
@@ -96,6 +99,7 @@ def main() -> None:
             shares = [ours.spent[part] / ours.spent["all"] for part in PARTS]
             cells = [task, envs, *(f"{rate:,.0f}" for rate in rates), f"{rates[1] / rates[0]:.0f}"]
             cells += [f"{share:.0%}" for share in (*shares, 1 - sum(shares))]
+            cells.append(f"{1e3 * ours.clock['physics'] / options.steps:.0f}")
             print("|", " | ".join(map(str, cells)), "|", flush=True)
 
 

@@ -5,9 +5,10 @@
 
 The curve is that of the run's event file (--agent.logger tensorboard): the mean reward of an episode at eleven times. The policy
 then plays 64 environments for 1,000 steps with mjlab's settings for play, without exploration. Printed are the reward of a
-second, how many episodes ended early, for tasks with a commanded velocity the mean difference of the velocity from the command, and
-the mean command, and for tasks that lift an object in how many environments it came to its goal. The video, drawn by mjsense, shows the first 10 s. The environment build/mjlab is that of
-tests/python/test_adapters.py; PYTHONPATH names the folder of the build.
+second, how many episodes ended early, for tasks with a commanded velocity the mean difference of the velocity from the command,
+and the mean command, and for tasks that lift an object in how many environments it came to its goal. The video, drawn by
+mjsense, shows the first 10 s. The environment build/mjlab is that of tests/python/test_adapters.py; PYTHONPATH names the folder
+of the build.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ def test_the_footer_says_what_pyarrow_says(tmp_path, codec):
     with open(path, "rb") as file:
         footer = parquet_footer.read(path, file)
     assert (footer.rows, footer.values) == (5, sum(column.num_values for column in columns)) and len(groups) == 3
-    assert footer.bytes == sum(column.total_uncompressed_size for column in columns)
+    assert 0 < footer.bytes < sum(column.total_uncompressed_size for column in columns)  # which count headers, too
     assert footer.codecs == {column.compression.replace("LZ4", "LZ4_RAW") for column in columns}
 
 
@@ -102,18 +102,14 @@ def with_page(path, packed, unpacked, stated):
     path.write_bytes(content[:begin] + page + packed + about + struct.pack("<I", len(about)) + b"PAR1")
 
 
-def test_a_page_is_not_larger_than_the_footer_states(tmp_path):
-    """Before, a file of 1 MB that stated 8 kB made Arrow unpack a page of 1 GB."""
+def test_the_sizes_of_pages_are_known_whatever_the_footer_states(tmp_path):
+    """Before, a file of 1 MB whose footer stated 8 kB made Arrow unpack a page of 1 GB."""
     path, size = tmp_path / "x.parquet", 1 << 20
     data = np.arange(1000).tobytes()
-    with_page(path, gzip.compress(data + bytes(size - len(data))), size, size + 100)
+    with_page(path, gzip.compress(data + bytes(size - len(data))), size, 8000)
     with open(path, "rb") as file:
-        assert parquet_footer.read(path, file).bytes == size + 100
+        assert parquet_footer.read(path, file).bytes == size
     assert pq.read_table(path)["x"].to_pylist()[-1] == 999
-    with_page(path, gzip.compress(data + bytes(size - len(data))), size, size - 1)
-    with open(path, "rb") as file, pytest.raises(ValueError, match="its pages are larger than its footer states"):
-        parquet_footer.read(path, file)
-    with_page(path, b"", size, 0)
     changed = bytearray(path.read_bytes())
     changed[4:8] = b"\xff" * 4
     path.write_bytes(changed)

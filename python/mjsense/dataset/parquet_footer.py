@@ -21,7 +21,7 @@ _HEADER_BYTES = (1 << 10, 1 << 16)  # usual and most bytes of a page's header
 _MAX_HEADERS = 1 << 22  # of all of them; a header has about 40
 # Fields of FileMetaData, RowGroup, ColumnChunk, ColumnMetaData and PageHeader.
 _NUM_ROWS, _ROW_GROUPS, _COLUMNS, _META_DATA, _CODEC, _NUM_VALUES = 3, 4, 1, 3, 4, 5
-_UNPACKED, _PACKED, _DATA_PAGE, _DICTIONARY_PAGE = 6, 7, 9, 11
+_PACKED, _DATA_PAGE, _DICTIONARY_PAGE = 7, 9, 11
 _PAGE_UNPACKED, _PAGE_PACKED = 2, 3
 _CODECS = ("UNCOMPRESSED", "SNAPPY", "GZIP", "LZO", "BROTLI", "LZ4", "ZSTD", "LZ4_RAW")
 
@@ -33,15 +33,15 @@ class Footer:
     rows: int
     values: int
     bytes: int
-    """Of the unpacked columns."""
+    """Of the unpacked pages. The footer's own sizes may be others."""
     codecs: frozenset[str]
 
 
 def read(path: Path, file: BinaryIO) -> Footer:
-    """The footer of a file that is open at any position, after its pages have been compared with it. ``path`` is for errors.
+    """The footer of a file that is open at any position, and the sizes of its pages. ``path`` is for errors.
 
     Raises:
-        ValueError: The footer is damaged, or a page has another size than it states.
+        ValueError: The footer or the header of a page is damaged.
     """
     try:
         size = file.seek(0, 2)
@@ -53,29 +53,22 @@ def read(path: Path, file: BinaryIO) -> Footer:
         table = _Reader(file.read(length)).fields(0)
         groups = table[_ROW_GROUPS]
         columns = [column[_META_DATA] for group in groups for column in group[_COLUMNS]]
-        values, sizes = [column[_NUM_VALUES] for column in columns], [column[_UNPACKED] for column in columns]
+        rows, values = table[_NUM_ROWS], [column[_NUM_VALUES] for column in columns]
         codecs = {column[_CODEC] for column in columns}
-        if min(table[_NUM_ROWS], *values, *sizes, *codecs, 0) < 0:
+        places = [(min(column[_DATA_PAGE], column.get(_DICTIONARY_PAGE) or size), column[_PACKED]) for column in columns]
+        if min(rows, *values, *codecs, 0) < 0 or any(min(place) < 0 or sum(place) > size for place in places):
             raise ValueError
-        footer = Footer(table[_NUM_ROWS], sum(values), sum(sizes), frozenset(_CODECS[codec] for codec in codecs))
-        places = [
-            (min(column[_DATA_PAGE], column.get(_DICTIONARY_PAGE) or size), column[_PACKED], column[_UNPACKED])
-            for column in columns
-        ]
-        if any(begin < 0 or packed < 0 or begin + packed > size for begin, packed, _ in places):
-            raise ValueError
+        names = frozenset(_CODECS[codec] for codec in codecs)
     except (ValueError, TypeError, LookupError, struct.error):
         raise ValueError(f"{path}: not a Parquet file that can be read: its footer is damaged") from None
-    parsed = 0
-    for begin, packed, unpacked in places:
+    unpacked = parsed = 0
+    for begin, packed in places:
         for page in _pages(path, file, begin, begin + packed):
-            unpacked -= page.unpacked
+            unpacked += page.unpacked
             parsed += page.header
-            if unpacked < 0:
-                raise ValueError(f"{path}: not a Parquet file that can be read: its pages are larger than its footer states")
             if parsed > _MAX_HEADERS:
                 raise ValueError(f"{path}: the headers of its pages have more than {_MAX_HEADERS} bytes")
-    return footer
+    return Footer(rows, sum(values), unpacked, names)
 
 
 class _Page(NamedTuple):
