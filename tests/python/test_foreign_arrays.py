@@ -505,7 +505,7 @@ def unit(v):
 
 
 def warp_colors(model, data, rays, points, normals, rgb, specular, exponent, emission, lit):
-    """mujoco_warp's light model: colours of points, [n, 3]. `lit`: 1, or 0.3 where the directional light is shadowed."""
+    """mujoco_warp's light model: colours of points, [n, 3]. `lit`: 1, or the share of light where the directional light is shadowed."""
     head, ambient = model.vis.headlight, model.light_ambient.sum(0)
     result, gloss = rgb * (emission + head.ambient + ambient), 0
     lights = [(-unit(data.cam_xmat[0].reshape(3, 3) @ [0, 0, -1]), 1.0, head.diffuse, head.specular, 1.0)]
@@ -524,8 +524,10 @@ def warp_colors(model, data, rays, points, normals, rgb, specular, exponent, emi
     return np.clip(result + gloss, 0, 1)
 
 
-@pytest.mark.parametrize(("shadows", "threads"), [(False, 1), (True, 3)])
-def test_images_have_the_colours_of_mujoco_warps_light_model(shadows, threads):
+@pytest.mark.parametrize(("shadows", "threads", "series_4"), [(False, 1, False), (True, 3, False), (True, 1, True)])
+def test_images_have_the_colours_of_mujoco_warps_light_model(shadows, threads, series_4):
+    """mujoco_warp 3.11 gives a geom the colour of its material, and 4.0 its own."""
+    share = 0.1 if series_4 else 0.3
     model = mujoco.MjModel.from_xml_string(SEEN)
     data, width, height = mujoco.MjData(model), 40, 28
     mujoco.mj_forward(model, data)
@@ -534,7 +536,7 @@ def test_images_have_the_colours_of_mujoco_warps_light_model(shadows, threads):
     packed, depth = np.zeros((2, 5 + width * height), np.uint32), np.zeros((2, width * height), np.float32)
     ids = np.full((2, width * height, 2), 9, np.int32)
     arrays = (packed.ctypes.data + 20, depth.ctypes.data, ids.ctypes.data)
-    worlds.render([(0, width, height, None, arrays)], (5 + width * height, width * height, 2 * width * height), 7, True, shadows, False, 0xFF102030)
+    worlds.render([(0, width, height, None, arrays)], (5 + width * height, width * height, 2 * width * height), 7, True, shadows, False, 0xFF102030, series_4, False, share)
     assert not packed[:, :5].any()
     np.testing.assert_array_equal(packed[0], packed[1])
     rgb = np.stack([packed[1, 5:] >> shift & 255 for shift in (16, 8, 0)], -1).astype(int)
@@ -553,11 +555,11 @@ def test_images_have_the_colours_of_mujoco_warps_light_model(shadows, threads):
     np.testing.assert_allclose(depth[0], np.where(seen, sphere, plane) * -local[:, 2], rtol=1e-5)
     np.testing.assert_array_equal(ids[1], np.stack([seen, np.full_like(seen, mujoco.mjtObj.mjOBJ_GEOM, int)], -1))
     points = eye + sphere[seen, None] * rays[seen]
-    wanted = warp_colors(model, data, rays[seen], points, unit(points - middle), np.array([0.6, 0.4, 0.2]), 0.8, 12.8, 0.15, 1.0)
+    wanted = warp_colors(model, data, rays[seen], points, unit(points - middle), np.array([0, 1.0, 0] if series_4 else [0.6, 0.4, 0.2]), 0.8, 12.8, 0.15, 1.0)
     assert np.abs(rgb[seen] - np.floor(255 * wanted)).max() <= 1
     points = eye + plane[floor, None] * rays[floor]
     away = on_sphere(points, -unit(data.light_xdir[0])) > 0
-    lit = np.where(away & shadows, 0.3, 1.0)[:, None]
+    lit = np.where(away & shadows, share, 1.0)[:, None]
     wanted = warp_colors(model, data, rays[floor], points, np.array([[0, 0, 1.0]]), np.array([0.5, 0.7, 0.9]), 0.5, 64, 0, lit)
     assert (np.abs(rgb[floor] - np.floor(255 * wanted)).max(-1) <= 1).mean() > 0.99
     assert away.sum() > 10
@@ -576,10 +578,10 @@ def test_images_use_the_poses_models_and_pixels_of_the_program():
     size[1, 0], pose[2, 2] = 2, 6
     depth, rgb = np.zeros((3, 9), np.float32), np.zeros((3, 9), np.uint32)
     camera = (0, 3, 3, (-0.03, 0.03, 0.02, -0.02), (rgb.ctypes.data, depth.ctypes.data, 0))
-    worlds.render([camera], (9, 9, 0), 1 << 1, False, False, False, 0xFF102030)
+    worlds.render([camera], (9, 9, 0), 1 << 1, False, False, False, 0xFF102030, False, False, 0.3)
     np.testing.assert_allclose(depth[:, 4], [3, 2, 5], rtol=1e-6)
     camera = (*camera[:3], (1.0, 1.0, 0.02, -0.02), camera[4])  # pixels next to the sphere
-    worlds.render([camera], (9, 9, 0), 1 << 1, False, False, False, 0xFF102030)
+    worlds.render([camera], (9, 9, 0), 1 << 1, False, False, False, 0xFF102030, False, False, 0.3)
     assert not depth.any()
     assert (rgb == 0xFF102030).all()
 
