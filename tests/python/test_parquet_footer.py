@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Footers of Parquet files; pyarrow ends the process when it reads some damaged ones."""
+"""Footers and pages of Parquet files; pyarrow ends the process when it reads some damaged footers."""
 
 import contextlib
 import gzip
@@ -115,3 +115,14 @@ def test_the_sizes_of_pages_are_known_whatever_the_footer_states(tmp_path):
     path.write_bytes(changed)
     with open(path, "rb") as file, pytest.raises(ValueError, match="the header of a page is damaged"):
         parquet_footer.read(path, file)
+
+
+def test_more_than_the_limits_is_an_error(tmp_path, monkeypatch):
+    path = tmp_path / "index.parquet"
+    pq.write_table(pa.table(ROW), path)
+    monkeypatch.setattr(index, "_TABLE_BYTES", 100)
+    with pytest.raises(ValueError, match=r"index\.parquet has \d+ bytes when it is unpacked, more than 100$"):
+        index.rows_of(path)
+    monkeypatch.setattr(parquet_footer, "_MAX_HEADERS", 100)
+    with pytest.raises(ValueError, match="the headers of its pages have more than 100 bytes$"):
+        index.rows_of(path)
