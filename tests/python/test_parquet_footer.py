@@ -124,5 +124,5 @@ def test_more_than_the_limits_is_an_error(tmp_path, monkeypatch):
     with pytest.raises(ValueError, match=r"index\.parquet has \d+ bytes when it is unpacked, more than 100$"):
         index.rows_of(path)
     monkeypatch.setattr(parquet_footer, "_MAX_HEADERS", 100)
-    with pytest.raises(ValueError, match="the headers of its pages have more than 100 bytes$"):
+    with pytest.raises(ValueError, match=r"the headers of its pages have more than 100 bytes$"):
         index.rows_of(path)
