@@ -89,7 +89,7 @@ def state(tool, fingers):
 # ------------------------------------------------------------------------------------------------------ demonstrations
 
 
-def record(out, episodes):
+def record(out, episodes, shading):
     """Path of new demonstrations.
 
     The robot is `franka` with 25 times its action noise. The actions, which are recorded without noise, lead back to the path, so
@@ -106,6 +106,7 @@ def record(out, episodes):
         width=WIDTH,
         height=HEIGHT,
         crf=12,
+        shading=shading,
         out=out,
         episodes=episodes,
         num_worlds=8,
@@ -350,7 +351,7 @@ def loaded(path):
     return network.eval()
 
 
-def evaluate(network, episodes, out, scene="", seed=10_000, worlds=50):
+def evaluate(network, episodes, out, chosen, seed=10_000, worlds=50):
     """Results of some unseen episodes: ``[episodes]``, whether the robot held the object above the table for HELD steps without a
     break, and whether the training contained all words of the instruction."""
     results = mjs.evaluate(
@@ -360,7 +361,7 @@ def evaluate(network, episodes, out, scene="", seed=10_000, worlds=50):
         out=out,
         overwrite=True,
         episodes=episodes,
-        scene=scene,
+        scene=chosen.scene,
         seed=seed,
         num_worlds=min(worlds, episodes),
         arm_controller=CONTROLLER,
@@ -368,6 +369,8 @@ def evaluate(network, episodes, out, scene="", seed=10_000, worlds=50):
         width=WIDTH,
         height=HEIGHT,
         camera_system="close_up",
+        shading=chosen.judged_shading or chosen.shading,
+        samples_per_pixel=chosen.samples_per_pixel,
         instructions="canonical",
         terminate_upon_success=False,
     )
@@ -382,6 +385,9 @@ def main():
     arguments.add_argument("--episodes", type=int, default=200, help="Number of demonstrations.")
     arguments.add_argument("--steps", type=int, default=3500, help="Number of training steps.")
     arguments.add_argument("--judged", type=int, default=200, help="Number of unseen episodes.")
+    arguments.add_argument("--shading", default="classic", help="Images of the demonstrations: classic, pbr or path.")
+    arguments.add_argument("--judged-shading", help="Images of the unseen episodes; by default those of the demonstrations.")
+    arguments.add_argument("--samples-per-pixel", type=int, default=16, help="Paths per pixel of images with shading path.")
     arguments.add_argument("--scene", default="", help="Scene of the unseen episodes; by default the task's.")
     arguments.add_argument("--data", type=Path, help="Recording to read instead of a new one.")
     arguments.add_argument("--out", type=Path, default=Path("pictures"), help="Folder of the network and of the results.")
@@ -389,7 +395,7 @@ def main():
     chosen = arguments.parse_args()
     torch.set_num_threads(1)  # the networks are small
     network = loaded(chosen.network) if chosen.network else trained(chosen)
-    won, known = evaluate(network, chosen.judged, chosen.out / "trained", chosen.scene)
+    won, known = evaluate(network, chosen.judged, chosen.out / "trained", chosen)
     low, high = wilson(won.sum(), len(won))
     print(f"trained: {won.sum()} of {len(won)} unseen episodes ({low:.0%} to {high:.0%})", flush=True)
     if not known.all():
@@ -402,10 +408,10 @@ def main():
 def trained(chosen):
     """A network trained on the chosen demonstrations."""
     with tempfile.TemporaryDirectory() as out:
-        data = Demonstrations(chosen.data or record(out, chosen.episodes), chosen.episodes)
+        data = Demonstrations(chosen.data or record(out, chosen.episodes, chosen.shading), chosen.episodes)
     print(f"{chosen.episodes} demonstrations, {len(data.state)} steps", flush=True)
     network = new_network(data)
-    won, _ = evaluate(network.eval(), min(50, chosen.judged), chosen.out / "untrained", chosen.scene)
+    won, _ = evaluate(network.eval(), min(50, chosen.judged), chosen.out / "untrained", chosen)
     print(f"untrained: {won.mean():.0%}", flush=True)
     train(network, data, chosen.steps)
     torch.save({"vocabulary": network.vocabulary, "weights": network.state_dict()}, chosen.out / "network.pt")

@@ -12,7 +12,12 @@ namespace mjsense::render {
 namespace {
 
 // Solid angle of an area 1 on a face, at (s, t).
-double solid_angle(double s, double t) { return std::pow(1 + s * s + t * t, -1.5); }
+double solid_angle(double s, double t) {
+  const double square = 1 + s * s + t * t;
+  return 1 / (square * std::sqrt(square));
+}
+
+constexpr int kParts = 16384;  // of the probability; there are 23,814 cells
 
 // The cell that holds a place -1..1, and the position in it, 0..1.
 struct CellPlace {
@@ -52,37 +57,54 @@ EnvironmentSampler::EnvironmentSampler(const EnvironmentLight& light)
         ends_.push_back(total);
       }
   mean_ = total / (4 * std::numbers::pi);
-  if (total > 0)
-    for (double& end : ends_) end /= total;
+  if (!(total > 0)) return;
+  for (double& end : ends_) end /= total;
+  int cell = 0;
+  for (int part = 0; part <= kParts; ++part) {
+    while (cell + 1 < std::ssize(ends_) && ends_[cell] <= static_cast<double>(part) / kParts)
+      ++cell;
+    starts_.push_back(cell);
+  }
+}
+
+Rgb64 EnvironmentSampler::between(int face, int y, int x, double down, double across) const {
+  const auto* texel = &texels_[(face * size_ + y) * size_ + x];
+  Rgb64 out;
+  for (int c = 0; c < 3; ++c) {
+    const double top = texel[0][c] + across * (texel[1][c] - texel[0][c]);
+    const double bottom = texel[size_][c] + across * (texel[size_ + 1][c] - texel[size_][c]);
+    out[c] = top + down * (bottom - top);
+  }
+  return out;
 }
 
 Rgb64 EnvironmentSampler::radiance(const Vec3& direction) const {
   const CubePlace at = cube_place(direction);
   const CellPlace x(at.s, size_ - 1), y(at.t, size_ - 1);
-  const auto* texel = &texels_[(at.face * size_ + y.cell) * size_ + x.cell];
-  Rgb64 out;
-  for (int c = 0; c < 3; ++c)
-    out[c] = std::lerp(std::lerp<double>(texel[0][c], texel[1][c], x.within),
-                       std::lerp<double>(texel[size_][c], texel[size_ + 1][c], x.within), y.within);
-  return out;
+  return between(at.face, y.cell, x.cell, y.within, x.within);
 }
 
-Vec3 EnvironmentSampler::sample(double choice, double u, double v) const {
-  const auto found = std::ranges::upper_bound(ends_, choice);
+EnvironmentSampler::Sample EnvironmentSampler::sample(double choice, double u, double v) const {
+  const int part = static_cast<int>(choice * kParts);
+  const auto first = ends_.begin() + starts_[part], last = ends_.begin() + starts_[part + 1];
+  const int cell = static_cast<int>(std::upper_bound(first, last, choice) - ends_.begin());
   const int cells = size_ - 1;
-  const int cell = static_cast<int>(std::min<std::ptrdiff_t>(
-      found - ends_.begin(), static_cast<std::ptrdiff_t>(ends_.size()) - 1));
-  const int x = cell % cells, y = cell / cells % cells;
-  return cube_direction({cell / (cells * cells), 2 * (x + u) / cells - 1, 2 * (y + v) / cells - 1});
+  const int face = cell / (cells * cells), x = cell % cells, y = cell / cells % cells;
+  const double s = 2 * (x + u) / cells - 1, t = 2 * (y + v) / cells - 1;
+  return {cube_direction({face, s, t}), density(cell, s, t), between(face, y, x, v, u)};
+}
+
+double EnvironmentSampler::density(int cell, double s, double t) const {
+  const double share = ends_[cell] - (cell ? ends_[cell - 1] : 0);
+  const int cells = size_ - 1;
+  return share * cells * cells / 4 / solid_angle(s, t);
 }
 
 double EnvironmentSampler::density(const Vec3& direction) const {
   const CubePlace at = cube_place(direction);
   const int cells = size_ - 1;
   const CellPlace x(at.s, cells), y(at.t, cells);
-  const int cell = (at.face * cells + y.cell) * cells + x.cell;
-  const double share = ends_[cell] - (cell ? ends_[cell - 1] : 0);
-  return share * cells * cells / 4 / solid_angle(at.s, at.t);
+  return density((at.face * cells + y.cell) * cells + x.cell, at.s, at.t);
 }
 
 }  // namespace mjsense::render

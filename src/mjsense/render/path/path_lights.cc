@@ -88,7 +88,10 @@ PathLights::Arriving PathLights::arriving(const ViewLight& light, const Vec3& p)
   for (double& x : to) x /= distance;
   const float* a = light.attenuation;
   double scale = 1 / std::max(a[0] + distance * (a[1] + distance * a[2]), 1e-6);
-  if (light.range > 0) scale *= std::max(1 - std::pow(distance / light.range, 4), 0.0);
+  if (light.range > 0) {
+    const double square = distance / light.range * (distance / light.range);
+    scale *= std::max(1 - square * square, 0.0);
+  }
   if (light.kind == LightKind::kSpot) {
     const double cosine = -dot(to, vec3(light.dir));
     if (cosine < light.cos_cutoff) return {to, distance, 0};
@@ -230,15 +233,14 @@ bool PathLights::sample(const Vec3& p, double total, PathRandom& random, LightSa
   out.choice = part / total;
   const double choice = random.uniform();
   const auto [u, v] = random.square();
-  const Vec3 d = environment_->sample(choice, u, v);
+  const auto [d, density, radiance] = environment_->sample(choice, u, v);
   const float* r = view_->physical.r_ec;
   for (int k = 0; k < 3; ++k) out.direction[k] = r[k] * d[0] + r[3 + k] * d[1] + r[6 + k] * d[2];
   out.direction = unit(out.direction);
   out.distance = INFINITY;
   out.blocked = true;
-  out.density = environment_->density(d);
-  out.radiance = environment_->radiance(d);
-  for (int c = 0; c < 3; ++c) out.radiance[c] *= view_->physical.radiance_scale[c];
+  out.density = density;
+  for (int c = 0; c < 3; ++c) out.radiance[c] = radiance[c] * view_->physical.radiance_scale[c];
   return out.density > 0;
 }
 

@@ -13,19 +13,21 @@ namespace mjsense::render {
 class PathRandom {
  public:
   PathRandom() = default;
-  PathRandom(std::uint32_t pixel, std::uint32_t sample) : pixel_(pixel), sample_(sample) {}
+  PathRandom(std::uint32_t pixel, std::uint32_t sample)
+      : pixel_(hash(pixel)), reversed_sample_(reversed(sample)) {}
 
   // Continues with the first dimension of the path's surface `index`. The numbers of dimensions at a
   // surface may differ from path to path.
   void begin_surface(int index) { dimension_ = 16 * (static_cast<std::uint32_t>(index) + 1); }
 
   // Uniform in [0, 1).
-  double uniform() { return square()[0]; }
+  double uniform() {
+    const std::uint32_t seed = next_seed();
+    return first(order(seed), seed);
+  }
   std::array<double, 2> square() {
-    const std::uint32_t seed = hash(hash(pixel_) + dimension_++);
-    const std::uint32_t at = scrambled(sample_, seed);
-    return {scrambled(reversed(at), hash(seed + 1)) * 0x1p-32,
-            scrambled(second(at), hash(seed + 2)) * 0x1p-32};
+    const std::uint32_t seed = next_seed(), at = order(seed);
+    return {first(at, seed), fraction(scrambled(second(at) + hash(seed + 2)))};
   }
 
  private:
@@ -41,22 +43,33 @@ class PathRandom {
     x = (x & 0x0f0f0f0fu) << 4 | (x >> 4 & 0x0f0f0f0fu);
     return __builtin_bswap32(x);
   }
-  // Flips each bit depending on the bits above it.
-  static std::uint32_t scrambled(std::uint32_t x, std::uint32_t seed) {
-    x = reversed(x) + seed;
+  // Flips each bit depending on the bits below it. Scrambled numbers are kept with their bits in reverse order,
+  // so that these are the bits above it.
+  static std::uint32_t scrambled(std::uint32_t x) {
     for (const std::uint32_t factor : {0x6c50b47cu, 0xb82f1e52u, 0xc7afe638u, 0x8d22f6e6u})
       x ^= x * factor;
-    return reversed(x);
+    return x;
   }
-  // The second dimension of Sobol's sequence.
+  static double fraction(std::uint32_t x) { return reversed(x) * 0x1p-32; }
+  std::uint32_t next_seed() { return hash(pixel_ + dimension_++); }
+  // The shuffled number of the sample.
+  std::uint32_t order(std::uint32_t seed) const {
+    return reversed(scrambled(reversed_sample_ + seed));
+  }
+  static double first(std::uint32_t at, std::uint32_t seed) {
+    return fraction(scrambled(at + hash(seed + 1)));
+  }
+  // The second dimension of Sobol's sequence, bits reversed: bit j is the sum, modulo 2, of the bits k of the index
+  // whose binomial coefficient (k over j) is odd, which are those whose k has all bits of j.
   static std::uint32_t second(std::uint32_t index) {
-    std::uint32_t out = 0;
-    for (std::uint32_t column = 1u << 31; index; index >>= 1, column ^= column >> 1)
-      if (index & 1) out ^= column;
-    return out;
+    index ^= index >> 1 & 0x55555555u;
+    index ^= index >> 2 & 0x33333333u;
+    index ^= index >> 4 & 0x0f0f0f0fu;
+    index ^= index >> 8 & 0x00ff00ffu;
+    return index ^ index >> 16;
   }
 
-  std::uint32_t pixel_ = 0, sample_ = 0, dimension_ = 0;
+  std::uint32_t pixel_ = 0, reversed_sample_ = 0, dimension_ = 0;
 };
 
 }  // namespace mjsense::render

@@ -48,15 +48,15 @@ void set_box(const rays::RayGeom& g, int index, rays::BoxList& boxes) {
 // The axis along which the ray is steepest, and its sign, in the upper bits; the rays of one packet have the
 // same, because the kernels then cull geoms. Below them, the place of the direction on that face of a
 // cube, of 8 x 8, in Morton's order: rays with near numbers have near directions.
-constexpr int kPlaces = 64;
-int direction_class(const PathRay& ray) {
+constexpr std::uint32_t kPlaces = 64;
+std::uint32_t direction_class(const PathRay& ray) {
   const float x = std::abs(ray.d[0]), y = std::abs(ray.d[1]), z = std::abs(ray.d[2]);
-  const int axis = x >= y && x >= z ? 0 : y >= z ? 1 : 2;
+  const std::uint32_t axis = x >= y && x >= z ? 0 : y >= z ? 1 : 2;
   const float steep = std::max({x, y, z, 1e-6f});
-  int place = 0;
+  std::uint32_t place = 0;
   for (int k = 1; k < 3; ++k) {
     const float slope = ray.d[(axis + k) % 3] / steep;  // -1..1
-    const int step = std::clamp(static_cast<int>(4 * (slope + 1)), 0, 7);
+    const std::uint32_t step = std::clamp(static_cast<int>(4 * (slope + 1)), 0, 7);
     for (int bit = 0; bit < 3; ++bit) place |= (step >> bit & 1) << (2 * bit + k - 1);
   }
   return kPlaces * (2 * axis + (ray.d[axis] < 0)) + place;
@@ -101,11 +101,13 @@ void PathScene::build(const View& view) {
 }
 
 void PathScene::trace(std::span<const PathRay> rays, Stops stops, std::span<PathHit> hits) const {
-  std::vector<std::pair<int, int>> order;  // class, ray
+  std::vector<std::uint64_t> order;  // class << 32 | ray
   order.reserve(rays.size());
   for (const PathRay& ray : rays)
-    order.emplace_back(direction_class(ray), static_cast<int>(order.size()));
+    order.push_back(std::uint64_t{direction_class(ray)} << 32 | order.size());
   std::ranges::sort(order);
+  const auto group = [&](std::size_t i) { return (order[i] >> 32) / kPlaces; };
+  const auto ray_at = [&](std::size_t i) { return order[i] & 0xffffffffu; };
   std::vector<rays::RayCandidate> candidates(geoms_.size());
   const rays::KernelScene scene{triangles_.data(), height_fields_.data()};
   const rays::KernelWorld world{geoms_.data(),    boxes_->all(), boxes_->box_of_geom(),
@@ -115,15 +117,14 @@ void PathScene::trace(std::span<const PathRay> rays, Stops stops, std::span<Path
   const rays::KernelFilter filter{sight ? kSeen : kBlocks, -1, false, sight, true, nullptr};
   for (std::size_t first = 0; first < order.size();) {
     std::size_t last = first + 1;
-    while (last < order.size() && last < first + rays::kPacket &&
-           order[last].first / kPlaces == order[first].first / kPlaces)
+    while (last < order.size() && last < first + rays::kPacket && group(last) == group(first))
       ++last;
     rays::RayPacket packet;
     rays::HitPacket found;
     std::ranges::fill(packet.origin, 0.0);
     for (int lane = 0; lane < rays::kPacket; ++lane) {
       const std::size_t i = std::min(first + lane, last - 1);
-      const PathRay& ray = rays[order[i].second];
+      const PathRay& ray = rays[ray_at(i)];
       for (int k = 0; k < 3; ++k) {
         packet.o[k][lane] = ray.o[k];
         packet.d[k][lane] = ray.d[k];
@@ -134,7 +135,7 @@ void PathScene::trace(std::span<const PathRay> rays, Stops stops, std::span<Path
     kernels_->trace(scene, world, filter, packet, found, candidates.data(), count);
     for (int lane = 0; first < last; ++first, ++lane) {
       const int geom = found.geom[lane];
-      hits[order[first].second] = {
+      hits[ray_at(first)] = {
           found.t[lane],    geom < 0 ? -1 : index_[geom],
           found.prim[lane], {found.n[0][lane], found.n[1][lane], found.n[2][lane]},
           found.u[lane],    found.v[lane]};

@@ -12,7 +12,7 @@ namespace mjsense::render {
 namespace {
 
 // Samples of a tile that are traced together. More of them have more similar rays in a packet.
-constexpr int kTogether = 4;
+constexpr int kTogether = 16;
 
 }  // namespace
 

@@ -123,12 +123,13 @@ void PathWave::trace(PathScene::Stops stops) {
   hits_.resize(rays_.size());
   scene_.trace(rays_, stops, hits_);
   met_.clear();
-  for (int i = 0; i < static_cast<int>(active_.size()); ++i)
-    if (hits_[i].geom >= 0) met_.push_back(i);
-  std::ranges::sort(met_, {}, [&](int i) { return std::pair(hits_[i].geom, i); });
+  for (std::size_t i = 0; i < active_.size(); ++i)
+    if (hits_[i].geom >= 0) met_.push_back(static_cast<std::uint64_t>(hits_[i].geom) << 32 | i);
+  std::ranges::sort(met_);
   met_hits_.clear();
   points_.clear();
-  for (int i : met_) {
+  for (std::uint64_t& i : met_) {
+    i &= 0xffffffffu;
     const Path& path = paths_[active_[i]];
     met_hits_.push_back(hits_[i]);
     points_.push_back(advanced(path.o, hits_[i].t, path.d));

@@ -3,6 +3,7 @@
 // Paths of many pixels that advance together, one reflection at a time, so that rays can be traced and
 // surfaces be gathered in packets.
 
+#include <cstdint>
 #include <vector>
 
 #include "mjsense/render/path/path_lights.h"
@@ -53,7 +54,7 @@ class PathWave {
   // Working memory.
   std::vector<PathRay> rays_;
   std::vector<PathHit> hits_;
-  std::vector<int> met_;  // of active_: those that hit a geom, by geom
+  std::vector<std::uint64_t> met_;  // of active_: those that hit a geom, by geom
   std::vector<PathHit> met_hits_;
   std::vector<Vec3> points_;
   std::vector<PathSurface> surfaces_;
