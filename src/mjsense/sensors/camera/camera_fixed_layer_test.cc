@@ -46,7 +46,8 @@ std::string room(Rng& rng) {
 
 struct Camera {
   std::unique_ptr<Sensor> sensor;
-  explicit Camera(const mjModel* model, int num_worlds = 1, int threads = 1, bool shadows = true) {
+  explicit Camera(const mjModel* model, int num_worlds = 1, int threads = 1, bool shadows = true,
+                  bool physical = false) {
     CameraSensorCfg cfg;
     cfg.name = "cam";
     cfg.camera_name = "c";
@@ -54,6 +55,7 @@ struct Camera {
     cfg.height = 50;
     cfg.data_types = {"rgb", "depth", "segmentation", "normals"};
     cfg.use_shadows = shadows;
+    if (physical) cfg.shading = "pbr";
     sensor = cfg.build();
     SensorInit init;
     init.model = model;
@@ -86,13 +88,14 @@ std::vector<std::uint8_t> image(Camera& camera, const TestModel& m, rays::RaySce
 }
 
 TEST(FixedLayer, DoesNotChangeImages) {
-  for (int scene = 0; scene < 4; ++scene) {
+  for (int scene = 0; scene < 7; ++scene) {
+    const bool physical = scene >= 4;
     Rng rng(5, 0, 1, scene);
     TestModel m(room(rng));
     rays::RayScene rays(m.model, 1);
     ThreadPool pool(1 + scene % 3);
     const bool shadows = scene != 3;
-    Camera keeps(m.model, 1, 1 + scene % 3, shadows);
+    Camera keeps(m.model, 1, 1 + scene % 3, shadows, physical);
     const int box = m.model->ngeom - 3, light = 1;
     const std::vector<std::function<void()>> changes = {
         [] {},
@@ -122,7 +125,7 @@ TEST(FixedLayer, DoesNotChangeImages) {
     };
     for (std::size_t i = 0; i < changes.size(); ++i) {
       changes[i]();
-      Camera fresh(m.model, 1, 1 + scene % 3, shadows);
+      Camera fresh(m.model, 1, 1 + scene % 3, shadows, physical);
       EXPECT_EQ(image(keeps, m, rays, pool), image(fresh, m, rays, pool))
           << "scene " << scene << " image " << i;
     }
