@@ -35,7 +35,8 @@ def main() -> None:
         for width, height in SIZES:
             for kind in ("rgb", "depth"):
                 with tempfile.NamedTemporaryFile(suffix=".npz") as file:
-                    peer = run_peer("filament", "filament_cameras", name, str(width), str(height), kind, file.name)
+                    camera = camera_scenes.CAMERAS[name]
+                    peer = run_peer("filament", "filament_cameras", name, camera, str(width), str(height), kind, file.name)
                     image = np.load(file.name)["image"]
                 ours = measure(of_scene(name), (width, height), (kind,), 8 * CPUS)
                 case = f"{name} {width}x{height} {kind}{' with shadows' if kind == 'rgb' else ''}"

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Physically based images per CPU second compared with mujoco-warp-pbr on Warp's CPU device.
+"""Physically based images per CPU second compared with mujoco-warp-pbr on Warp's CPU device, and with Filament, the renderer of
+MuJoCo 4, through Vulkan (Mesa's lavapipe, without a GPU).
 
-64 worlds at 84 x 84, and one image at 640 x 480, in views of camera_scenes.VIEWS; rgb with shadows in the light of the same
-surroundings. The peer has no ambient occlusion: rows say whether mjsense's images have it. Neither side draws samples within
-pixels; mjsense draws mirrors and the peer does not. Physics and kinematics are not measured. --pictures=FOLDER writes the images
-of both. Other arguments are views to measure. The peer needs a Python 3.12; the first run compiles its kernels for each scene,
+64 worlds at 84 x 84, and one image at 640 x 480, in views of camera_scenes.VIEWS; rgb with shadows. mujoco-warp-pbr has the light
+of the same surroundings, Filament its own, and renders one world at a time. Neither has ambient occlusion here: rows say whether
+mjsense's images have it. No side draws samples within pixels; mjsense draws mirrors and the peers do not. Physics and
+kinematics are not measured. --pictures=FOLDER writes the images of all. Other arguments are views to measure. mujoco-warp-pbr and
+Filament need a Python 3.12, Filament a Vulkan driver (mesa-vulkan-drivers); the first run compiles kernels for each scene,
 which takes minutes.
 """
 
@@ -53,27 +55,23 @@ def main() -> None:
                 ]
                 ours = Ours(view, shots, worlds=worlds, threads=1)
                 rates = [ours.rate(0), ours.rate(1)]
-                images = pathlib.Path(scratch) / "images.npz"
-                peer = run_peer(
-                    "warp_pbr", "warp_cameras", name, str(width), str(height), str(worlds), str(surroundings), str(images)
-                )
-                case = f"{view.label}, {width}x{height}"
+                images, picture = (pathlib.Path(scratch) / name for name in ("images.npz", "picture.npz"))
+                size, light = (str(width), str(height)), str(surroundings)
+                peers = {
+                    "mujoco-warp-pbr": run_peer("warp_pbr", "warp_cameras", name, *size, str(worlds), light, str(images)),
+                    "Filament": run_peer("filament", "filament_cameras", view.scene, view.camera, *size, "rgb", str(picture)),
+                }
                 for rate, occlusion in zip(rates, ("with", "without")):
-                    rows.append(
-                        Row(
-                            f"{case}, {occlusion} ambient occlusion",
-                            rate,
-                            "images/CPU s",
-                            peer["images_per_second"],
-                            "mujoco-warp-pbr",
-                        )
-                    )
-                    print(f"{rows[-1].case}: {rate:.1f} against {rows[-1].peer:.2f}", file=sys.stderr)
+                    case = f"{view.label}, {width}x{height}, {occlusion} ambient occlusion"
+                    for peer, found in peers.items():
+                        rows.append(Row(case, rate, "images/CPU s", found["images_per_second"], peer))
+                        print(f"{case}: {rate:.1f} against {rows[-1].peer:.2f} of {peer}", file=sys.stderr)
                 if folder:
                     first = Ours(view, shots, worlds=1, threads=1)
                     first.frame()
-                    write_sheet(folder / f"{name}_{height}_pbr.png", first.cameras[0].data.rgb[0], np.load(images)["rgb"])
-    report("Physically based images and mujoco-warp-pbr", rows)
+                    shown = [first.cameras[0].data.rgb[0], np.load(images)["rgb"], np.load(picture)["image"]]
+                    write_sheet(folder / f"{name}_{height}_pbr.png", *shown)
+    report("Physically based images", rows)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Images per CPU second of MuJoCo's Filament renderer through Vulkan, in software if there is no GPU:
 
-    filament_cameras SCENE WIDTH HEIGHT rgb|depth image.npz
+    filament_cameras SCENE CAMERA WIDTH HEIGHT rgb|depth image.npz
 
 One image at a time without multisampling; rgb with shadows but without reflections, its most expensive feature. The time includes
 the update of its scene, rendering and reading the image back. mujoco.rendering.filament.Renderer needs Python 3.12, so this
@@ -46,7 +46,8 @@ def metres(depth: np.ndarray, camera: mjrf.Camera) -> np.ndarray:
 
 
 def main() -> None:
-    name, width, height, kind, file = sys.argv[1], int(sys.argv[2]), int(sys.argv[3]), sys.argv[4], sys.argv[5]
+    name, view, kind, file = sys.argv[1], sys.argv[2], sys.argv[5], sys.argv[6]
+    width, height = int(sys.argv[3]), int(sys.argv[4])
     model = camera_scenes.compiled(name)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -80,7 +81,7 @@ def main() -> None:
         mujoco.mj_forward(model, data)
         start = time.process_time()
         everything.update(data)
-        request.camera = camera(model, data, camera_scenes.CAMERAS[name])
+        request.camera = camera(model, data, view)
         context.wait_for_frame(context.render([request], [read]))
         if frame:
             seconds.append(time.process_time() - start)

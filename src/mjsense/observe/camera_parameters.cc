@@ -8,8 +8,8 @@
 #include <numbers>
 
 #include "mjsense/core/error.h"
-#include "mjsense/observe/frame.h"
 #include "mjsense/render/view/camera_model.h"
+#include "mjsense/scene/resolve.h"
 
 namespace mjsense::observe {
 
@@ -23,7 +23,7 @@ CameraParameterSensor::CameraParameterSensor(std::string name, std::string camer
 }
 
 void CameraParameterSensor::initialize(const SensorInit& init) {
-  id_ = object_id(init.model, mjOBJ_CAMERA, fmt::format("sensor '{}'", name()), camera_);
+  id_ = scene::resolve(init.model, mjOBJ_CAMERA, camera_, fmt::format("sensor '{}'", name()));
   if (init.model->cam_projection[id_] == mjPROJ_ORTHOGRAPHIC)
     throw ValueError(fmt::format(
         "sensor '{}': camera '{}' is orthographic: it has no pinhole matrix", name(), camera_));

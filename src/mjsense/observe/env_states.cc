@@ -7,6 +7,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/observe/frame.h"
+#include "mjsense/scene/resolve.h"
 
 namespace mjsense::observe {
 namespace {
@@ -85,9 +86,9 @@ std::vector<EnvStatesSensor::Articulation> EnvStatesSensor::find_articulations(
 
 void EnvStatesSensor::initialize(const SensorInit& init) {
   const mjModel* m = init.model;
-  const int robot = robot_body_.empty()
-                        ? -1
-                        : object_id(m, mjOBJ_BODY, fmt::format("sensor '{}'", name()), robot_body_);
+  const int robot = robot_body_.empty() ? -1
+                                        : scene::resolve(m, mjOBJ_BODY, robot_body_,
+                                                         fmt::format("sensor '{}'", name()));
   clear_fields();
   actors_.clear();
   for (const auto& [body, actor] : actors_of(m, robot)) {

@@ -15,24 +15,16 @@ Frame Frame::find(const mjModel* model, std::string_view context, std::string_vi
     throw ValueError(fmt::format("{}: a frame must be a body or a site, not '{}'", context, type));
   }
   const mjtObj object = type == "body" ? mjOBJ_BODY : mjOBJ_SITE;
-  return {object, object_id(model, object, context, name)};
+  return {object, scene::resolve(model, object, name, context)};
 }
 
 void BodyRef::resolve(const mjModel* model, std::string_view context) {
-  if (!name.empty()) id_ = object_id(model, mjOBJ_BODY, context, name);
+  if (!name.empty()) id_ = scene::resolve(model, mjOBJ_BODY, name, context);
 }
 
 Pose Frame::pose(const mjData* data) const {
   if (type == mjOBJ_BODY) return body_pose(data, id);
   return site_pose(data, id);
-}
-
-std::vector<std::string> object_names(const mjModel* model, mjtObj type) {
-  return scene::model_names(model, type);
-}
-
-int object_id(const mjModel* model, mjtObj type, std::string_view context, std::string_view name) {
-  return scene::resolve(model, type, name, context);
 }
 
 }  // namespace mjsense::observe

@@ -48,9 +48,4 @@ inline bool is_descendant_or_self(const mjModel* model, int body, int root) {
   while (body > root) body = model->body_parentid[body];
   return body == root;
 }
-
-// Names of all objects of a type, "" for those without a name.
-std::vector<std::string> object_names(const mjModel* model, mjtObj type);
-// Id of the named object. Throws KeyError with `context` and the nearest names.
-int object_id(const mjModel* model, mjtObj type, std::string_view context, std::string_view name);
 }  // namespace mjsense::observe

@@ -290,13 +290,6 @@ std::int64_t Batches::first(int batch) const {
   return std::int64_t{batch} * (episodes / count) + std::min(batch, episodes % count);
 }
 
-std::vector<int> batch_sizes(int episodes, int batches) {
-  const Batches all = batches_of(episodes, batches);
-  std::vector<int> sizes(static_cast<std::size_t>(all.count));
-  for (int b = 0; b < all.count; ++b) sizes[b] = all.size(b);
-  return sizes;
-}
-
 std::string batch_file(int batch, int batches) {
   return fmt::format("trajectories_batch_{}_of_{}.h5", batch + 1, batches);
 }

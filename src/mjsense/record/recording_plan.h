@@ -63,10 +63,7 @@ RecordingPlan plan_recording(const RecordingCfg& cfg);
 
 std::int64_t chunk_rows(std::size_t row_bytes);
 
-// Number of episodes in each batch. Sizes differ by at most one; larger batches come first.
-std::vector<int> batch_sizes(int episodes, int batches);
-
-// The same without storing the sizes: maps batches to ranges of episodes.
+// The episodes of each batch. Sizes differ by at most one; larger batches come first.
 struct Batches {
   int episodes = 0, count = 0;
   std::int64_t first(int batch) const;  // position of its first episode; first(count) == episodes

@@ -81,6 +81,13 @@ TEST(Layout, NumbersPerMoveGroupAreJsonRows) {
             "sensor 'qpos': its text can need 2012 bytes; its rows have 2000");
 }
 
+std::vector<int> batch_sizes(int episodes, int batches) {
+  const Batches all = batches_of(episodes, batches);
+  std::vector<int> sizes;
+  for (int b = 0; b < all.count; ++b) sizes.push_back(all.size(b));
+  return sizes;
+}
+
 TEST(Layout, BatchesEqualMolmoSpacesAndAreEven) {
   EXPECT_THAT(batch_sizes(8, 0), ElementsAre(4, 4));
   EXPECT_THAT(batch_sizes(1, 0), ElementsAre(1));

@@ -11,8 +11,8 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/model_geometry.h"
 #include "mjsense/core/named.h"
-#include "mjsense/observe/frame.h"
 #include "mjsense/rays/ray_scene.h"
+#include "mjsense/scene/resolve.h"
 #include "mjsense_tasks/cameras/visibility.h"
 
 namespace mjsense::tasks::cameras {
@@ -96,8 +96,8 @@ void CameraSystem::initialize(sim::Simulation& simulation) {
   ids_.clear();
   rest_.clear();
   for (std::size_t i = 0; i < mounted_.size(); ++i) {
-    const int id = observe::object_id(
-        m, mjOBJ_CAMERA, fmt::format("camera '{}'", cfg_.cameras[i].name), mounted_[i].camera);
+    const int id = scene::resolve(m, mjOBJ_CAMERA, mounted_[i].camera,
+                                  fmt::format("camera '{}'", cfg_.cameras[i].name));
     ids_.push_back(id);
     rest_.push_back({{vec3(m->cam_pos + 3 * id), quat(m->cam_quat + 4 * id)},
                      cfg_.cameras[i].fovy.value_or(m->cam_fovy[id])});

@@ -5,6 +5,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/observe/touches.h"
+#include "mjsense/scene/resolve.h"
 
 namespace mjsense::tasks::robots {
 
@@ -24,7 +25,7 @@ void GraspStateSensor::initialize(const SensorInit& init) {
   gripper_bits_.assign(m->nbody, 0);
   clear_fields();
   for (std::size_t i = 0; i < grippers_.size(); ++i) {
-    const int root = observe::object_id(m, mjOBJ_BODY, context, grippers_[i].body);
+    const int root = scene::resolve(m, mjOBJ_BODY, grippers_[i].body, context);
     for (int b = 0; b < m->nbody; ++b) {
       if (observe::is_descendant_or_self(m, b, root)) gripper_bits_[b] |= 1u << i;
     }

@@ -4,6 +4,7 @@
 // where they are above the surface's horizon, other geoms as spheres. There is no noise, and no ray is
 // cast. Part of the tile kernels.
 
+#include <algorithm>
 #include <cmath>
 
 #include "mjsense/render/kernels/surfaces.h"

@@ -51,8 +51,4 @@ void set_exr_reader(ExrReader reader);
 // Either of them, by the suffix of the path.
 EnvironmentImage parse_environment(const std::string& path, const std::string& bytes);
 
-inline EnvironmentImage read_radiance_file(const std::string& path) {
-  return parse_radiance(path, read_environment_file(path));
-}
-
 }  // namespace mjsense::render

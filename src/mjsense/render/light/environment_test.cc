@@ -15,6 +15,10 @@
 namespace mjsense::render {
 namespace {
 
+EnvironmentImage read(const std::string& path) {
+  return parse_environment(path, read_environment_file(path));
+}
+
 template <class Radiance>
 EnvironmentImage image_of(int height, Radiance radiance) {
   EnvironmentImage image{2 * height, height, {}};
@@ -149,7 +153,7 @@ TEST(Environment, EveryTruncatedFileIsAnError) {
     whole += std::string("\x02\x02\x00\x08", 4) + "\x88\x40\x88\x41\x88\x42\x88\x82";
   for (std::size_t n = 0; n <= whole.size(); ++n) {
     std::ofstream(path, std::ios::binary) << whole.substr(0, n);
-    const std::string text = error_of<ValueError>([&] { return read_radiance_file(path); });
+    const std::string text = error_of<ValueError>([&] { return read(path); });
     EXPECT_EQ(text.empty(), n == whole.size()) << n << " bytes: " << text;
   }
 }
@@ -177,7 +181,7 @@ TEST(Environment, ReadsRunLengthEncodedAndPlainScanlines) {
   for (int i = 0; i < 8; ++i) plain += "\x80\x40\x20\x81";
   std::ofstream(path, std::ios::binary) << kHeader << "-Y 4 +X 8\n"
                                         << encoded << encoded << encoded << plain;
-  const EnvironmentImage image = read_radiance_file(path);
+  const EnvironmentImage image = read(path);
   EXPECT_EQ(image.width, 8);
   EXPECT_EQ(image.rgb[0], 1);
   EXPECT_EQ(image.rgb[3 * 7 + 1], 8.0f / 64);

@@ -47,7 +47,7 @@ TEST_F(Shifted, RejectsPosesInsideTheTable) {
 
 TEST_F(Shifted, HeldObjectsMoveWithTheBase) {
   const mjModel* m = stage.world.model;
-  const int block = observe::object_id(m, mjOBJ_BODY, "test", "red_block/red_block");
+  const int block = scene::resolve(m, mjOBJ_BODY, "red_block/red_block", "test");
   const robots::Hand hand = robots::hands_of(stage.robot(), m).at(0);
   const Pose tool_object{{0, 0, 0.02}, {}};
   Plan plan;

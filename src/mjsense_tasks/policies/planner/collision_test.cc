@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "mjsense/core/mujoco_objects.h"
-#include "mjsense/observe/frame.h"
 #include "mjsense/scene/resolve.h"
 #include "mjsense_tasks/policies/planner/testing/table_scene.h"
 
@@ -83,8 +82,7 @@ TEST(Collision, AHeldObjectMovesWithTheTool) {
   const robots::Robot& robot = stage.robot();
   const int arm = robot.arm(), gripper = robot.gripper();
   const robots::Chain& chain = robot.chain(arm);
-  const int block =
-      observe::object_id(stage.world.model, mjOBJ_BODY, "test", "red_block/red_block");
+  const int block = scene::resolve(stage.world.model, mjOBJ_BODY, "red_block/red_block", "test");
   const Pose down{{0.5, 0.0, 0.75}, {0, 1, 0, 0}};
   robots::RobotValues values;
   robot.read_qpos(stage.world, values);
