@@ -313,7 +313,7 @@ void PathWave::add_samples(int x0, int x1, int y0, int y1, int first, int last,
     for (int i : active_) (paths_[i].reflections > 0 ? reflected : passing).push_back(i);
     active_ = std::move(passing);
     if (!active_.empty()) continue;
-    active_ = std::move(reflected);
+    active_.swap(reflected);
     camera = false;
   }
   for (std::size_t i = 0; i < paths_.size(); ++i)
