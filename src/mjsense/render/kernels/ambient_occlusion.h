@@ -4,7 +4,6 @@
 // where they are above the surface's horizon, other geoms as spheres. There is no noise, and no ray is
 // cast. Part of the tile kernels.
 
-#include <algorithm>
 #include <cmath>
 
 #include "mjsense/render/kernels/surfaces.h"
@@ -13,12 +12,12 @@
 namespace mjsense::render {
 namespace {
 
-// The geoms that may hide the environment from the points of a tile, and their boxes: `fixed` fixed geoms, then
-// others.
+// The geoms that may hide the environment from the points of a tile, and their boxes.
 struct Occluders {
   const int* list = nullptr;
   OccluderBoxes boxes;
-  int fixed = 0, count = 0;
+  int count = 0;
+  bool moving = false;  // some are not fixed
 };
 
 // Which of kWidth boxes, from number i on, may hide the environment from points in a sphere.
@@ -42,7 +41,7 @@ inline std::uint32_t boxes_near(const OccluderBoxes& boxes, int i, const float* 
 // Finds those of `part` for points between `low` and `high`, in the memory of `scratch`.
 inline void find_occluders(const View& view, Part part, const float* low, const float* high,
                            TileScratch& scratch, Occluders& out) {
-  out = {scratch.occluders, scratch.occluder_boxes};
+  out = {scratch.occluders, scratch.occluder_boxes, 0, false};
   if (low[0] > high[0]) return;
   float center[3], square = 0;
   for (int c = 0; c < 3; ++c) {
@@ -51,28 +50,19 @@ inline void find_occluders(const View& view, Part part, const float* low, const 
     square += half * half;
   }
   const float radius = std::sqrt(square);
-  // Moving ones are collected at the end of the list.
-  int* list = scratch.occluders;
-  int moving = view.num_geoms;
-  const auto add = [&](int g) {
-    const bool fixed = view.geoms[g].fixed;
-    if (fixed) {
-      list[out.fixed++] = g;
-    } else if (part == Part::kAll) {
-      list[--moving] = g;
-    }
-  };
-  for (int i = 0; i < view.num_geoms; i += kWidth)
+  for (int i = 0; i < view.num_geoms; i += kWidth) {
     for (std::uint32_t near = boxes_near(view.occluders, i, center, radius); near;
          near &= near - 1) {
       const int g = i + __builtin_ctz(near);
-      if (g < view.num_geoms) add(g);
+      if (g >= view.num_geoms) return;
+      if (!belongs(view.geoms[g], part)) continue;
+      scratch.occluders[out.count] = g;
+      for (int k = 0; k < OccluderBoxes::kRows; ++k)
+        out.boxes.row(k)[out.count] = view.occluders.row(k)[g];
+      ++out.count;
+      out.moving |= !view.geoms[g].fixed;
     }
-  out.count = out.fixed;
-  for (int i = moving; i < view.num_geoms; ++i) list[out.count++] = list[i];
-  for (int i = 0; i < out.count; ++i)
-    for (int k = 0; k < OccluderBoxes::kRows; ++k)
-      out.boxes.row(k)[i] = view.occluders.row(k)[list[i]];
+  }
 }
 
 // angle / sin(angle) / (2 pi) of the angle between unit vectors with this cross product; the error is
@@ -194,28 +184,18 @@ inline float sphere_around(const Surfaces& s, std::uint32_t lanes, float* center
   return std::sqrt(lane_max(square));
 }
 
-// Whether one of the occluders [first, last) may hide the environment from points in a sphere.
-inline bool any_near(const Occluders& tile, int first, int last, const float* center,
-                     float radius) {
-  for (int i = first; i < last; i += kWidth) {
-    const std::uint32_t near = boxes_near(tile.boxes, i, center, radius);
-    if (near & ((1u << std::min(last - i, kWidth)) - 1)) return true;
-  }
-  return false;
-}
-
-// Multiplies by the part of the environment's light that the occluders [first, last) of the tile let through to
-// the points of `lanes`, 0..1.
-inline void open_sky(const View& view, const Occluders& tile, int first, int last,
-                     const Surfaces& s, const Hits& hits, std::uint32_t lanes, float* open) {
+// Part of the environment's light that reaches the points of `lanes`, 0..1.
+inline void open_sky(const View& view, const Occluders& tile, const Surfaces& s, const Hits& hits,
+                     std::uint32_t lanes, float* out) {
+  for (int k = 0; k < kLanes; k += kWidth) store(out + k, splat(1.0f));
   if (!lanes) return;
   float center[3];
   const float radius = sphere_around(s, lanes, center);
-  for (int begin = first; begin < last; begin += kWidth) {
-    for (std::uint32_t near = boxes_near(tile.boxes, begin, center, radius); near;
+  for (int first = 0; first < tile.count; first += kWidth) {
+    for (std::uint32_t near = boxes_near(tile.boxes, first, center, radius); near;
          near &= near - 1) {
-      const int i = begin + __builtin_ctz(near);
-      if (i >= last) return;
+      const int i = first + __builtin_ctz(near);
+      if (i >= tile.count) return;
       const ViewGeom& g = view.geoms[tile.list[i]];
       const float reach = tile.boxes.row(OccluderBoxes::kReach)[i];
       for (int k = 0; k < kLanes; k += kWidth) {
@@ -227,7 +207,7 @@ inline void open_sky(const View& view, const Occluders& tile, int first, int las
             mask_of(lanes >> k & kAllLanes) & over & ~(load(hits.geom + k) == int_of(tile.list[i]));
         if (!any(other)) continue;
         const Float hidden = min(hidden_by(g, p, n, reach), splat(1.0f));
-        store(open + k, load(open + k) * (splat(1.0f) - select(other, hidden, splat(0.0f))));
+        store(out + k, load(out + k) * (splat(1.0f) - select(other, hidden, splat(0.0f))));
       }
     }
   }

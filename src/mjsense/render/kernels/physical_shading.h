@@ -220,13 +220,10 @@ inline void shade_physical(const View& view, const Surfaces& s, const Hits& hits
       add_direct(light, lit.terms[k / kWidth], s, r, eye, k, dark, out);
   }
   alignas(64) float open[kLanes];
-  const bool occluded = shadows && view.physical.occlusion_reach > 0;
-  const bool kept = occluded && shadows->known && shadows->fixed_lanes == lanes;
-  for (int k = 0; k < kLanes; k += kWidth)
-    store(open + k, kept ? load(shadows->known->open + shadows->packet * kLanes + k) : splat(1.0f));
-  if (occluded) {
-    const Occluders& near = shadows->near;
-    open_sky(view, near, kept ? near.fixed : 0, near.count, s, hits, lanes, open);
+  if (shadows && view.physical.occlusion_reach > 0) {
+    open_sky(view, shadows->near, s, hits, lanes, open);
+  } else {
+    for (int k = 0; k < kLanes; k += kWidth) store(open + k, splat(1.0f));
   }
   for (int k = 0; k < kLanes; k += kWidth) {
     store(open + k, load(open + k) * load(s.occlusion + k));

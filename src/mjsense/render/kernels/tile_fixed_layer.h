@@ -154,11 +154,6 @@ inline void make_fixed(const View& view, int count, int packets, Tile& tile, Til
       const std::uint32_t dark = dark_lanes(view, i, lit, surfaces, hits, lanes, shadows);
       out.unlit[i][q] = static_cast<std::uint16_t>(dark & lanes);
     }
-    if (view.physical.occlusion_reach > 0) {
-      float* open = out.open + q * kLanes;
-      for (int k = 0; k < kLanes; k += kWidth) store(open + k, splat(1.0f));
-      open_sky(view, shadows.near, 0, shadows.near.count, surfaces, hits, lanes, open);
-    }
     Shadows known = shadows;
     known.known = &out;
     known.fixed_lanes = lanes;
@@ -171,10 +166,19 @@ inline void make_fixed(const View& view, int count, int packets, Tile& tile, Til
   }
 }
 
-// Determines the dark lanes of a packet that shows only fixed geoms at the points `s.p`. Returns whether a moving
-// geom casts a shadow on it.
-inline bool settle(const View& view, const Surfaces& s, const Hits& hits, std::uint32_t lanes,
+// Determines the dark lanes of a packet that shows only fixed geoms. Returns whether a moving geom
+// casts a shadow on it.
+inline bool settle(const View& view, const Pixels& pixels, const Hits& hits, std::uint32_t lanes,
                    Shadows& shadows) {
+  Surfaces s;
+  for (int k = 0; k < kLanes; k += kWidth) {
+    const Vec3f p = hit_point(view, pixels, hits, k);
+    store(s.p[0] + k, p.x);
+    store(s.p[1] + k, p.y);
+    store(s.p[2] + k, p.z);
+    // Normals are used only for self-shadows, which are already known.
+    for (auto& n : s.n) store(n + k, splat(0.0f));
+  }
   bool darker = false;
   for (int i = 0; i < view.num_lights; ++i) {
     const ViewLight& light = view.lights[i];
@@ -200,24 +204,8 @@ inline bool settle(const View& view, const Surfaces& s, const Hits& hits, std::u
 // Loads the colours of packet `packet` from the layer. Returns false if they no longer apply.
 inline bool load_colors(const View& view, const FixedTile& kept, const Pixels& pixels,
                         const Hits& hits, std::uint32_t lanes, Shadows& shadows, Colors& out) {
-  if (lanes != shadows.fixed_lanes) return false;
-  const Occluders& near = shadows.near;
-  if (view.shadows || near.fixed < near.count) {
-    Surfaces s;
-    for (int k = 0; k < kLanes; k += kWidth) {
-      const Vec3f p = hit_point(view, pixels, hits, k);
-      store(s.p[0] + k, p.x);
-      store(s.p[1] + k, p.y);
-      store(s.p[2] + k, p.z);
-      // Normals are used only for self-shadows, which are already known.
-      for (auto& n : s.n) store(n + k, splat(0.0f));
-    }
-    const bool darker = view.shadows && settle(view, s, hits, lanes, shadows);
-    float center[3];
-    if (darker || (near.fixed < near.count &&
-                   any_near(near, near.fixed, near.count, center, sphere_around(s, lanes, center))))
-      return false;
-  }
+  if (lanes != shadows.fixed_lanes || shadows.near.moving) return false;
+  if (view.shadows && settle(view, pixels, hits, lanes, shadows)) return false;
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < kLanes; k += kWidth)
       store(out.rgb[c] + k, load(kept.rgb[c] + shadows.packet * kLanes + k));

@@ -206,19 +206,12 @@ void ChangedTiles::mark_occlusion(const View& view) {
   const auto near = [&](const TileBox& box, const ViewGeom* g) {
     if (!g || !hides_environment(*g)) return false;
     if (g->type == mjGEOM_PLANE) return true;
-    float away[3], half2 = 0, square = 0;  // of a sphere around the tile's points to the geom's box
+    float square = 0;
     for (int i = 0; i < 3; ++i) {
-      const float half = 0.5f * (box.high[i] - box.low[i]);
-      half2 += half * half;
-      away[i] = 0.5f * (box.high[i] + box.low[i]) - g->center[i];
+      const float away = std::max({box.low[i] - g->center[i], g->center[i] - box.high[i], 0.0f});
+      square += away * away;
     }
-    for (int i = 0; i < 3; ++i) {
-      const float local = g->rot[i] * away[0] + g->rot[3 + i] * away[1] + g->rot[6 + i] * away[2];
-      const float beyond = std::max(std::abs(local) - g->aabb[3 + i], 0.0f);
-      square += beyond * beyond;
-    }
-    const float reach =
-        1.001f * (std::sqrt(half2) + hiding_reach(*g, view.physical.occlusion_reach)) + 1e-4f;
+    const float reach = 1.001f * (g->radius + hiding_reach(*g, view.physical.occlusion_reach));
     return square < reach * reach;
   };
   for (std::size_t tile = 0; tile < changed_.size(); ++tile) {

@@ -24,7 +24,7 @@ class FixedLayer {
  public:
   // Whether the camera and all lights are fixed.
   static bool possible(const mjModel* model, int camera);
-  // Size of the tiles: 52 bytes per pixel. The memory is only committed once the tiles are written.
+  // Size of the tiles: 48 bytes per pixel. The memory is only committed once the tiles are written.
   static std::size_t bytes(int width, int height);
 
   FixedLayer(const mjModel* model, int width, int height);

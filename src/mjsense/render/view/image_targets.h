@@ -28,7 +28,6 @@ struct alignas(64) FixedTile {
   int id[kPixels];               // ViewGeom::id, or -1
   int prim[kPixels];             // triangle of a mesh; -1 for the walls of a height field
   float rgb[3][kPixels];         // colour (or radiance) where no other geom casts a shadow
-  float open[kPixels];           // part of the environment's light that fixed geoms let through
   // By light and packet: a bit for each pixel that the light does not reach, because a fixed geom
   // shadows it or it faces away.
   std::uint16_t unlit[kMaxLights][kPixels / 16];

@@ -3,7 +3,6 @@
 // A geom of a view: its pose, shape and material in the camera's frame.
 
 #include <algorithm>
-#include <cmath>
 
 #include "mjsense/render/view/surface_assets.h"
 #include "mjsense/render/view/texture_maps.h"
@@ -89,15 +88,12 @@ struct alignas(64) ViewGeom {
 bool hides_environment(const ViewGeom& geom);
 
 // Distance from the geom up to which it hides the environment, m; at most `reach`. For shapes that count as
-// rounded it is 3.5 times their thickness, where a sphere hides less than 2 % of the environment. For boxes it is
-// four times the radius of the cube that shows as large an area from its corner.
+// rounded it is 3.5 times their thickness, where a sphere hides less than 2 % of the environment.
 inline float hiding_reach(const ViewGeom& geom, float reach) {
   const float* half = geom.aabb + 3;
-  if (geom.type == mjGEOM_PLANE) return reach;
-  if (geom.type != mjGEOM_BOX) return std::min(7 * std::min({half[0], half[1], half[2]}), reach);
-  const float x = half[1] * half[2], y = half[2] * half[0], z = half[0] * half[1];
-  const float side = std::sqrt(std::sqrt((x * x + y * y + z * z) / 3));  // half of it
-  return std::min(4 * std::sqrt(3.0f) * side, reach);
+  const bool box = geom.type == mjGEOM_BOX || geom.type == mjGEOM_PLANE;
+  const float own = box ? 4 * geom.radius : 7 * std::min({half[0], half[1], half[2]});
+  return std::min(own, reach);
 }
 
 }  // namespace mjsense::render
