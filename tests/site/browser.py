@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Opens the pages of the built site in headless Chromium, one after the other in a frame of a given width, and measures them.
+"""Opens the pages of the built site that have tables in headless Chromium, one after the other in a frame of a given width, and
+measures them.
 
-    python tests/site/browser.py site 1280    prints what does not fit, page by page
+python tests/site/browser.py site 1280    prints what does not fit, page by page
 """
 
 import contextlib
@@ -50,8 +51,10 @@ def chromium():
 
 
 def measure(site, width, timeout=400):
-    """{page: {"tables": count, "wide": [first rows], "foreign": [URLs], "page_wide": pixels}} of all pages."""
-    pages = sorted(str(p.relative_to(site)) for p in Path(site).rglob("*.html") if "api" not in p.parts and p.name != "404.html")
+    """{page: {"tables": count, "wide": [first rows], "foreign": [URLs], "page_wide": pixels}} of the pages with tables."""
+    pages = sorted(
+        str(p.relative_to(site)) for p in Path(site).rglob("*.html") if "api" not in p.parts and "<table" in p.read_text()
+    )
     answer = queue.Queue()
 
     class Handler(http.server.SimpleHTTPRequestHandler):

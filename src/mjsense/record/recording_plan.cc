@@ -167,6 +167,113 @@ std::string fingerprint(const RecordingCfg& cfg, const RecordingPlan& plan,
   return j.dump();
 }
 
+class Planner {
+ public:
+  explicit Planner(const RecordingCfg& cfg) : cfg_(cfg) {}
+
+  RecordingPlan plan() {
+    for (const char* own : kOwnPaths) claim(own, "the recorder");
+    for (const char* group : standard_groups()) claim(group, "the layout");
+    for (const Sensor* sensor : cfg_.sensors) add(sensor);
+    for (const char* group : standard_groups()) owners_.erase(group);
+    check_paths(owners_);
+    plan_.fingerprint = fingerprint(cfg_, plan_, streams_);
+    return std::move(plan_);
+  }
+
+ private:
+  void add(const Sensor* sensor) {
+    if (sensor == nullptr) throw ValueError("recording: a sensor of the suite is null");
+    check_fields(*sensor);
+    if (const auto text = text_of(*sensor)) {
+      add_text(*sensor, *text);
+      return;
+    }
+    for (const Field& field : sensor->fields()) add_field(*sensor, field);
+    if (sensor->name() == "env_states") add_presence(*sensor);
+  }
+
+  void check_fields(const Sensor& sensor) const {
+    if (sensor.fields().empty()) {
+      throw ValueError(
+          fmt::format("sensor '{}' has no fields: initialize it before recording", sensor.name()));
+    }
+    for (const Field& field : sensor.fields()) {
+      if (field.data.shape().rank() == 0 || field.data.shape()[0] < cfg_.num_worlds) {
+        throw ValueError(fmt::format("sensor '{}': stream '{}' has shape {}, expected rows of {}",
+                                     sensor.name(), field.spec.name, field.data.shape().str(),
+                                     counted(cfg_.num_worlds, "world")));
+      }
+    }
+  }
+
+  // One dataset with the text of all fields, and a dataset for each field of numbers.
+  void add_text(const Sensor& sensor, const SensorSpec& text) {
+    note(sensor, text);
+    add_array(sensor, {.spec = text, .text = std::make_shared<JsonRows>(sensor, text.str_max_len)});
+    for (const Field& field : sensor.fields()) {
+      if (!has_numbers(sensor, field)) continue;
+      ArrayStream numbers{.spec = field.spec, .field = &field};
+      numbers.path = numbers_path(path_of(sensor.name()), field.name);
+      add_array(sensor, std::move(numbers));
+    }
+  }
+
+  void add_field(const Sensor& sensor, const Field& field) {
+    const bool array = field.spec.storage == Storage::kArray;
+    if (!cfg_.videos && !array) return;
+    note(sensor, field.spec);
+    if (array) {
+      add_array(sensor,
+                {.spec = field.spec, .field = &field, .present = presence_of(sensor, field)});
+      return;
+    }
+    const std::size_t first = plan_.videos.size();
+    add_videos(cfg_, sensor, field, plan_.videos);
+    for (std::size_t i = first; i < plan_.videos.size(); ++i)
+      claim("obs/sensor_data/" + plan_.videos[i].key, owner_of(sensor));
+  }
+
+  // The flags of things without a flag of their own, which are present in every episode.
+  void add_presence(const Sensor& env_states) {
+    for (const Field& field : env_states.fields()) {
+      const std::string thing = thing_of(field);
+      if (!thing.empty() && !owners_.contains(path_of("env_states/present/" + thing)))
+        add_array(env_states, {.spec = always_present(env_states, thing)});
+    }
+  }
+
+  void add_array(const Sensor& sensor, ArrayStream stream) {
+    stream.sensor = &sensor;
+    if (stream.path.empty()) stream.path = path_of(stream.spec.name);
+    stream.chunk_rows = chunk_rows(stream.row_bytes());
+    claim(stream.path, owner_of(sensor));
+    plan_.arrays.push_back(std::move(stream));
+  }
+
+  // Adds a stream to the fingerprint.
+  void note(const Sensor& sensor, const SensorSpec& spec) {
+    check_path(sensor.name(), spec.name);
+    streams_.push_back(fmt::format("{} {}{}", spec.name, dtype_name(spec.dtype), spec.shape.str()));
+  }
+
+  void claim(const std::string& path, const std::string& owner) {
+    const auto [at, fresh] = owners_.emplace(path, owner);
+    if (!fresh)
+      throw ValueError(fmt::format("{} and {} would both be stored as '{}'; rename one of them",
+                                   at->second, owner, path));
+  }
+
+  static std::string owner_of(const Sensor& sensor) {
+    return fmt::format("sensor '{}'", sensor.name());
+  }
+
+  const RecordingCfg& cfg_;
+  RecordingPlan plan_;
+  nlohmann::json streams_ = nlohmann::json::array();  // in the order of the suite
+  std::map<std::string, std::string> owners_;         // by path: "sensor 'x'"
+};
+
 }  // namespace
 
 Fps Fps::from_period_ms(std::int64_t policy_dt_ms) {
@@ -197,79 +304,7 @@ std::size_t ArrayStream::row_bytes() const { return spec.shape.size() * dtype_si
 
 std::size_t ArrayStream::kept_bytes() const { return text ? text->row_bytes() : row_bytes(); }
 
-RecordingPlan plan_recording(const RecordingCfg& cfg) {
-  RecordingPlan plan;
-  nlohmann::json streams = nlohmann::json::array();  // in the order of the suite
-  std::map<std::string, std::string> owners;         // path -> "sensor 'x'"
-  const auto claim = [&](const std::string& path, const std::string& owner) {
-    const auto [at, fresh] = owners.emplace(path, owner);
-    if (!fresh)
-      throw ValueError(fmt::format("{} and {} would both be stored as '{}'; rename one of them",
-                                   at->second, owner, path));
-  };
-  for (const char* own : kOwnPaths) claim(own, "the recorder");
-  for (const char* group : standard_groups()) claim(group, "the layout");
-  for (const Sensor* sensor : cfg.sensors) {
-    if (sensor == nullptr) throw ValueError("recording: a sensor of the suite is null");
-    if (sensor->fields().empty()) {
-      throw ValueError(
-          fmt::format("sensor '{}' has no fields: initialize it before recording", sensor->name()));
-    }
-    const std::string owner = fmt::format("sensor '{}'", sensor->name());
-    const auto add_array = [&](ArrayStream stream) {
-      stream.sensor = sensor;
-      if (stream.path.empty()) stream.path = path_of(stream.spec.name);
-      stream.chunk_rows = chunk_rows(stream.row_bytes());
-      claim(stream.path, owner);
-      plan.arrays.push_back(std::move(stream));
-    };
-    const auto note = [&](const SensorSpec& spec) {
-      check_path(sensor->name(), spec.name);
-      streams.push_back(
-          fmt::format("{} {}{}", spec.name, dtype_name(spec.dtype), spec.shape.str()));
-    };
-    for (const Field& field : sensor->fields()) {
-      if (field.data.shape().rank() == 0 || field.data.shape()[0] < cfg.num_worlds) {
-        throw ValueError(fmt::format("sensor '{}': stream '{}' has shape {}, expected rows of {}",
-                                     sensor->name(), field.spec.name, field.data.shape().str(),
-                                     counted(cfg.num_worlds, "world")));
-      }
-    }
-    if (const auto text = text_of(*sensor)) {
-      note(*text);
-      add_array({.spec = *text, .text = std::make_shared<JsonRows>(*sensor, text->str_max_len)});
-      for (const Field& field : sensor->fields()) {
-        if (!has_numbers(*sensor, field)) continue;
-        ArrayStream numbers{.spec = field.spec, .field = &field};
-        numbers.path = numbers_path(path_of(sensor->name()), field.name);
-        add_array(std::move(numbers));
-      }
-      continue;
-    }
-    for (const Field& field : sensor->fields()) {
-      if (!cfg.videos && field.spec.storage != Storage::kArray) continue;
-      note(field.spec);
-      if (field.spec.storage == Storage::kArray) {
-        add_array({.spec = field.spec, .field = &field, .present = presence_of(*sensor, field)});
-      } else {
-        const std::size_t first = plan.videos.size();
-        add_videos(cfg, *sensor, field, plan.videos);
-        for (std::size_t i = first; i < plan.videos.size(); ++i)
-          claim("obs/sensor_data/" + plan.videos[i].key, owner);
-      }
-    }
-    if (sensor->name() != "env_states") continue;
-    for (const Field& field : sensor->fields()) {
-      const std::string thing = thing_of(field);
-      if (thing.empty() || owners.contains(path_of("env_states/present/" + thing))) continue;
-      add_array({.spec = always_present(*sensor, thing)});
-    }
-  }
-  for (const char* group : standard_groups()) owners.erase(group);
-  check_paths(owners);
-  plan.fingerprint = fingerprint(cfg, plan, streams);
-  return plan;
-}
+RecordingPlan plan_recording(const RecordingCfg& cfg) { return Planner(cfg).plan(); }
 
 Batches batches_of(int episodes, int batches) {
   if (episodes <= 0)

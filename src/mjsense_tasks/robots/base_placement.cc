@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "mjsense/core/error.h"
 #include "mjsense/core/model_geometry.h"
@@ -75,6 +76,37 @@ Pose BasePlacement::from_root(const StateRow& state) const {
   return pose * tail_;
 }
 
+// Sets the joints to bring the base as near to the pose as they can: hinges first, since slides
+// cannot change the orientation; then the slides for the position.
+void BasePlacement::move_joints(const StateRow& state, const Pose& base) const {
+  for (std::size_t i = 0; i < links_.size(); ++i) {
+    state.qpos[qpos_[i]] = links_[i].zero;
+    state.qvel[dofs_[i]] = 0;
+  }
+  for (const bool slide : {false, true}) {
+    for (std::size_t i = 0; i < links_.size(); ++i) {
+      if (links_[i].slide == slide) state.qpos[qpos_[i]] += missing_motion(state, i, base);
+    }
+  }
+}
+
+// Motion of joint i that brings the base nearest to the pose (rad or m).
+double BasePlacement::missing_motion(const StateRow& state, std::size_t i, const Pose& base) const {
+  // Pose of the frame in which the joint moves (its parent's motion included), world frame.
+  Pose before = root_ * links_[0].fixed;
+  for (std::size_t k = 0; k < i; ++k) {
+    const Link& link = links_[k];
+    if (!link.slide) before.q = before.q * axis_angle(link.axis, state.qpos[qpos_[k]] - link.zero);
+    before = before * links_[k + 1].fixed;
+  }
+  const Vec3 axis = rotate(before.q, links_[i].axis);
+  const Pose now = root_ * from_root(state);
+  if (links_[i].slide) return dot(axis, base.p - now.p);
+  const Quat missing = base.q * conjugate(now.q);
+  const double along = missing.x * axis.x + missing.y * axis.y + missing.z * axis.z;
+  return std::remainder(2 * std::atan2(along, missing.w), 2 * std::numbers::pi);
+}
+
 void BasePlacement::write(const StateRow& state, const Pose& base) const {
   if (free_qpos_ >= 0) {
     write_vec(base.p, state.qpos + free_qpos_);
@@ -96,35 +128,7 @@ void BasePlacement::write(const StateRow& state, const Pose& base) const {
     write_quat(root.q, state.mocap_quat + 4 * mocap_);
     return;
   }
-  for (std::size_t i = 0; i < links_.size(); ++i) {
-    state.qpos[qpos_[i]] = links_[i].zero;
-    state.qvel[dofs_[i]] = 0;
-  }
-  // Hinges first, since slides cannot change the orientation; then the slides for the position.
-  for (const bool slide : {false, true}) {
-    for (std::size_t i = 0; i < links_.size(); ++i) {
-      if (links_[i].slide != slide) continue;
-      // Pose of the frame in which the joint moves (its parent's motion included), world frame.
-      Pose before = root_ * links_[0].fixed;
-      for (std::size_t k = 0; k < i; ++k) {
-        const Link& link = links_[k];
-        if (!link.slide)
-          before.q = before.q * axis_angle(link.axis, state.qpos[qpos_[k]] - link.zero);
-        before = before * links_[k + 1].fixed;
-      }
-      const Vec3 axis = rotate(before.q, links_[i].axis);
-      const Pose now = root_ * from_root(state);
-      double step = 0;
-      if (slide) {
-        step = dot(axis, base.p - now.p);
-      } else {
-        const Quat missing = base.q * conjugate(now.q);
-        const double along = missing.x * axis.x + missing.y * axis.y + missing.z * axis.z;
-        step = std::remainder(2 * std::atan2(along, missing.w), 2 * 3.14159265358979323846);
-      }
-      state.qpos[qpos_[i]] += step;
-    }
-  }
+  move_joints(state, base);
   const Pose root = base * inverse(from_root(state));
   const bool stands = distance(root, root_) < kSame;
   if (mocap_ >= 0) {

@@ -31,6 +31,8 @@ class BasePlacement {
   void write(const StateRow& state, const Pose& base) const;
 
  private:
+  void move_joints(const StateRow& state, const Pose& base) const;
+  double missing_motion(const StateRow& state, std::size_t joint, const Pose& base) const;
   Pose from_root(const StateRow& state) const;  // X_RB
 
   std::string context_, base_name_;

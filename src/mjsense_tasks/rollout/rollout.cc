@@ -139,6 +139,18 @@ Rollout::Rollout(RolloutCfg cfg, std::shared_ptr<episode::Task> task,
 
 void Rollout::make() {
   if (cfg_.on_construct_begin) cfg_.on_construct_begin(*this);
+  make_simulation();
+  bind_task();
+  control_robot();
+  if (policy_) task_->register_policy(*policy_);
+  reach_ = policies::StartReach::make(*task_);
+  compose_suite();
+  resize_worlds();
+  if (cfg_.on_constructed) cfg_.on_constructed(*this);
+}
+
+// Compiles the task's scene with the cameras and creates its worlds.
+void Rollout::make_simulation() {
   camera_system_ = std::make_unique<cameras::CameraSystem>(choose_cameras(*task_, cfg_));
   cameras_ = recorded_cameras(*camera_system_);
   scene::SceneCfg scene_cfg = task_->scene_cfg_with_robot();
@@ -160,12 +172,20 @@ void Rollout::make() {
                                                                   .seed = cfg_.seed});
   simulation_->measure_cost(true);
   for (RecordedCamera& camera : cameras_) camera.sensor = &scene->sensor(camera.name);
+}
+
+// Resolves the names of the cameras, the task and the policy in the compiled model.
+void Rollout::bind_task() {
   if (!task_->cfg().starts.empty()) camera_system_->allow_poses();
   camera_system_->initialize(*simulation_);
   if (view_) view_->initialize(*simulation_);
   task_->bind(simulation_);
   if (policy_) policy_->bind(simulation_);
-  task_->initialize(scene->model(), cfg_.num_worlds);
+  task_->initialize(simulation_->scene().model(), cfg_.num_worlds);
+}
+
+// Lets the robot's controllers run within a policy step, and records what a replay needs.
+void Rollout::control_robot() {
   const bool controls = task_->robot().controls_every_step();
   if (cfg_.replay_sensor) {
     const int every = controls ? task_->control_decimation() : task_->decimation();
@@ -179,8 +199,9 @@ void Rollout::make() {
       return replay_ && replay_->note_tick(world, index) ? mjSTAGE_NONE : valid;
     });
   }
-  if (policy_) task_->register_policy(*policy_);
-  reach_ = policies::StartReach::make(*task_);
+}
+
+void Rollout::compose_suite() {
   log_ = std::make_unique<ActionLog>(cfg_.num_worlds);
   if (cfg_.use_sensors) suite_ = core_suite(*task_, *log_, cameras_, robot_sensors());
   if (cfg_.more_sensors) {
@@ -191,7 +212,9 @@ void Rollout::make() {
   if (cfg_.use_sensors) task_->edit_suite(suite_);
   if (cfg_.edit_suite) cfg_.edit_suite(suite_);
   suite_.bind(*simulation_);
+}
 
+void Rollout::resize_worlds() {
   actions_.resize(cfg_.num_worlds);
   evaluations_.resize(cfg_.num_worlds);
   faults_.resize(cfg_.num_worlds);
@@ -202,7 +225,6 @@ void Rollout::make() {
     rows_.push_back(robots::state_row(simulation_->worlds(), w));
   ids_.reserve(cfg_.num_worlds);
   moving_.reserve(cfg_.num_worlds);
-  if (cfg_.on_constructed) cfg_.on_constructed(*this);
 }
 
 // The sensors of the robot's file, then those created in Python.

@@ -278,6 +278,11 @@ class Rollout {
   class ForEachHook;
   class WorldSubset;
   void make();
+  void make_simulation();
+  void bind_task();
+  void control_robot();
+  void compose_suite();
+  void resize_worlds();
   std::vector<std::shared_ptr<Sensor>> robot_sensors();
   std::span<const int> active_worlds();
   void move(std::span<const int> worlds, bool answers, std::span<const RecordedStep> recorded = {});
