@@ -504,6 +504,18 @@ def test_limits_of_the_server(monkeypatch):
             PolicyServer(Joints, port=served.port)
 
 
+@pytest.mark.parametrize(("connections", "limit"), [(2, 64 << 20), (64, 8 << 20)])
+def test_messages_of_all_connections_are_limited_together(connections, limit):
+    with PolicyServer(Joints, port=0, connections=connections) as served:
+        for size, code in ((limit, "1011"), (limit + 1, "1009")):  # not a message; too large
+            with connect(served.url, compression=None) as link:
+                link.recv()
+                with pytest.raises(ConnectionClosed, match=code):
+                    link.send(b"0" * size)
+                    while True:
+                        link.recv()
+
+
 @pytest.fixture(scope="module")
 def certificate(tmp_path_factory):
     """A certificate of 127.0.0.1 that signs itself, and its private key."""

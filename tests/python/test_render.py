@@ -110,28 +110,43 @@ def write_sky(path):
     return str(path)
 
 
+@pytest.fixture(scope="module")
+def videos_with(tmp_path_factory):
+    """The videos of a short recording with these options, which is made once."""
+    made = {}
+
+    def find(options):
+        key = json.dumps(options, sort_keys=True)
+        if key not in made:
+            out = tmp_path_factory.mktemp("short")
+            mjs.record("pick", out=out, **{**RECORDING, "episodes": 1, "horizon": 3, **options})
+            made[key] = out, videos(out)
+        return made[key]
+
+    return find
+
+
 @pytest.mark.parametrize("option", render_cameras.image_options())
-def test_every_image_option_is_kept(option, tmp_path):
+def test_every_image_option_is_kept(option, videos_with, tmp_path):
     few = {"samples_per_pixel": 1} if option == "samples_per_pixel" else {}
     default = few.get(option, render_cameras.recorded_images({})[option])
     value = VALUES.get(option, not default if isinstance(default, bool) else 4)
-    made, physical = {}, {"shading": "pbr"} if option in PHYSICAL else {"shading": "path", **few} if few else {}
-    given = {"environment": write_sky(tmp_path / "sky.hdr")} if option == "environment_rotation" else {}
+    physical = {"shading": "pbr"} if option in PHYSICAL else {"shading": "path", **few} if few else {}
+    file = {"environment": write_sky(tmp_path / "sky.hdr")} if option == "environment_rotation" else {}
     if option == "exposure_time_constant":
         physical["exposure_mode"] = "auto"
     if option == "motion_samples":
         physical["imager"] = "d435"
-    physical |= given
-    for name, given in (("usual", physical), ("data", {**physical, option: value})):
-        mjs.record("pick", out=tmp_path / name, **{**RECORDING, "episodes": 1, "horizon": 3, **given})
-        made[name] = videos(tmp_path / name)
-    assert made["data"] != made["usual"]
-    mjs.render(tmp_path / "data", tmp_path / "same", copy=False, **given)
+    given = {**physical, **file, option: value}
+    _, usual = videos_with({**physical, **file})
+    root, changed_images = videos_with(given)
+    assert changed_images != usual
+    mjs.render(root, tmp_path / "same", copy=False, **given)
     # An image sensor draws other random numbers.
-    assert (videos(tmp_path / "same") == made["data"]) == (option not in ("imager", "motion_samples"))
+    assert (videos(tmp_path / "same") == changed_images) == (option not in ("imager", "motion_samples"))
     assert mjs.Dataset(tmp_path / "same").episodes[0].settings[option] == value
-    mjs.render(tmp_path / "data", tmp_path / "back", **{**given, option: default})
-    assert (videos(tmp_path / "back") == made["usual"]) == (option != "motion_samples")
+    mjs.render(root, tmp_path / "back", **{**given, option: default})
+    assert (videos(tmp_path / "back") == usual) == (option != "motion_samples")
 
 
 def test_a_file_that_a_recording_names_is_not_opened(tmp_path):

@@ -316,7 +316,8 @@ def test_verify_finds_broken_videos(record_fake, house, tmp_path):
     victims[1].write_bytes(victims[5].read_bytes())
     done = record_fake("verify", tmp_path, check=False)
     assert done.returncode == 1
-    assert f"'{victims[0].name}' cannot be read" in done.stdout, done.stdout
+    first = f"'{victims[0].name}' "  # by ffmpeg 5, and by ffmpeg 9
+    assert f"{first}cannot be read" in done.stdout or f"{first}has 0 frames" in done.stdout, done.stdout
 
 
 def test_contact_sheet(record_fake, house, tmp_path):

@@ -2,7 +2,7 @@
 """Opens the pages of the built site that have tables in headless Chromium, one after the other in a frame of a given width, and
 measures them.
 
-python tests/site/browser.py site 1280    prints what does not fit, page by page
+    python tests/site/browser.py site 1280    prints what does not fit, page by page
 """
 
 import contextlib

@@ -24,6 +24,8 @@ from mjsense.evaluation.remote.messages import MAX_BYTES, pack, unpack
 from mjsense.evaluation.remote.served import BadRequest, ServedPolicy
 
 _INTERNAL_ERROR, _TRY_AGAIN_LATER = 1011, 1013  # codes of closed connections
+_BYTES_OF_ALL = 512 << 20
+"""Limit of one message of each connection together. A connection holds two: one that is answered and the next."""
 
 
 class PolicyServer:
@@ -47,7 +49,8 @@ class PolicyServer:
             :class:`RemotePolicy`.
         host: Address to listen at. Every program that can connect to it can use the policy.
         port: Port; 0: any free one.
-        connections: Maximum number of connections. Further ones are refused.
+        connections: Maximum number of connections. Further ones are refused. A message may have 512 MiB / ``connections``, at
+            most 64 MiB: 8 MiB with 64 connections.
         key_file: File with a key that clients must have: they send it as ``Authorization: Api-Key KEY``. Empty: no
             key.
         certificate, private_key: PEM files with which the server encrypts its connections, ``wss://HOST:PORT``. Empty: no
@@ -88,6 +91,7 @@ class PolicyServer:
         self._served = ServedPolicy(policy, policy_options or {}, of_task, connections, adapter)
         self._log = log or (lambda line: None)
         self._free = list(range(connections))
+        self._max_bytes = min(MAX_BYTES, _BYTES_OF_ALL // connections)
         self._episodes = 0
         made = self._served.policy
         about = {"version": _core.__version__, "name": made._mjs_name(), "fingerprint": fingerprint(made)}  # pyright: ignore[reportAttributeAccessIssue]  # stubs leave it out
@@ -142,7 +146,7 @@ class PolicyServer:
             host,
             port,
             compression=None,
-            max_size=MAX_BYTES,
+            max_size=self._max_bytes,
             max_queue=1,
             origins=[None],  # pages of a browser may not connect
             process_request=self._answer_request,
