@@ -221,35 +221,37 @@ class _Sizes:
         return copies * own + sum(self._tree(child, copies, below) for child in element)
 
     def _check_tables(self, root: Element, dofs: int) -> None:
-        elements = self._elements
         for size in root.iter("size"):
             self._add(max(1, self._value(size, "nkey", 1)) * (3 * dofs + 20), "keyframes")
             users = sum(self._whole(size, key)[0] for key in size.attrib if key.startswith("nuser_"))
-            self._add(users * elements, "user data")
+            self._add(users * self._elements, "user data")
         for tag in ("tendon", "sensor", "actuator", "custom"):
             for section in root.iter(tag):
                 for element in section:
-                    numbers = dofs if tag == "tendon" else 1
-                    if element.tag == "rangefinder" and "camera" in element.attrib:
-                        pixels = [
-                            self._value(camera, "resolution", 1)
-                            for camera in root.iter("camera")
-                            if camera.get("name") == element.get("camera")
-                        ]
-                        numbers = 8 * max(pixels, default=self._defaults.get(("camera", "resolution"), 1))
-                    elif element.tag == "numeric":
-                        numbers = self._value(element, "size", 1)
-                    elif tag == "sensor":
-                        numbers = 16 * self._value(element, "dim", 1) * self._value(element, "num", 1)
                     history = self._defaults_of_actuators() if element.tag in _ACTUATORS else 1
                     self._add(
-                        numbers * max(1, self._value(element, "nsample", 1), history),
+                        self._length(root, tag, element, dofs) * max(1, self._value(element, "nsample", 1), history),
                         f"the {tag} '{element.get('name', '')[:80]}'",
                     )
         for config in root.iter("config"):
             for word in config.get("value", "").split():
                 if re.fullmatch(r"[+-]?\d+", word) and abs(int(word[:20])) > 1000 and config.get("key") == "size":
                     self._fail("the size of a plugin", word[:40], 1000)
+
+    def _length(self, root: Element, section: str, element: Element, dofs: int) -> int:
+        """Upper bound of the numbers of one value of a tendon, sensor, actuator or custom element."""
+        if element.tag == "rangefinder" and "camera" in element.attrib:
+            pixels = [
+                self._value(camera, "resolution", 1)
+                for camera in root.iter("camera")
+                if camera.get("name") == element.get("camera")
+            ]
+            return 8 * max(pixels, default=self._defaults.get(("camera", "resolution"), 1))
+        if element.tag == "numeric":
+            return self._value(element, "size", 1)
+        if section == "sensor":
+            return 16 * self._value(element, "dim", 1) * self._value(element, "num", 1)
+        return dofs if section == "tendon" else 1
 
     def _defaults_of_actuators(self) -> int:
         return max([1, *(value for (tag, key), value in self._defaults.items() if key == "nsample" and tag in _ACTUATORS)])
