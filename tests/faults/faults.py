@@ -554,6 +554,17 @@ def generated(lab: Lab, trials: int) -> Row:
     import generated
 
     row = Row("generated changes, read by verify, Dataset, replay, render, export, inspect and repair", trials)
-    for column, note in generated.trials(lab.fresh("generated"), trials):
+    for column, note in generated.trials(lab.fresh("generated"), generated.generated_changes(trials)):
+        row.wrong(column, note)
+    return row
+
+
+def crafted_readers(lab: Lab, trials: int) -> Row:
+    """The crafted files, given to all readers of the Python package."""
+    import generated
+
+    changes = generated.crafted_changes(trials)
+    row = Row("crafted files, read by verify, Dataset, replay, render, export, inspect and repair", len(changes))
+    for column, note in generated.trials(lab.fresh("crafted_readers"), changes, always_refused=True):
         row.wrong(column, note)
     return row

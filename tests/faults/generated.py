@@ -31,6 +31,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+import crafted
 import h5py
 import numpy as np
 
@@ -630,29 +631,70 @@ def make_secret(folder: Path) -> Path:
     return secret
 
 
-def trials(folder: Path, count: int, seed: int = 1, first: int = 0) -> list[tuple[str, str]]:
-    """Runs trials in a folder. Returns what went wrong: the column of the table, and a sentence."""
+Change = Callable[[Path, Path], str]
+"""Changes the house of a recording, given the folder that no reader may open. Returns what was changed."""
+
+
+def generated_changes(count: int, seed: int = 1, first: int = 0) -> dict[int, Change]:
+    """Changes that follow from the seed and their number."""
+
+    def of(number: int) -> Change:
+        return lambda house, secret: f"change {number} of seed {seed} ({change(house, secret, seed, number)})"
+
+    return {number: of(number) for number in range(first, first + count)}
+
+
+def crafted_changes(count: int) -> dict[int, Change]:
+    """So many of the crafted files, at equal distances in their list."""
+
+    def of(name: str) -> Change:
+        def apply(house: Path, secret: Path) -> str:
+            (house.parent.parent / crafted.SECRET).mkdir()
+            crafted.CASES[name](house)
+            return name
+
+        return apply
+
+    names = list(crafted.CASES)
+    return {number: of(names[number]) for number in range(0, len(names), max(1, len(names) // count))}
+
+
+def _files_beside(lab: Path) -> set[Path]:
+    return {p for folder in (lab, lab / crafted.SECRET) if folder.is_dir() for p in folder.iterdir()}
+
+
+def trials(folder: Path, changes: dict[int, Change], always_refused: bool = False) -> list[tuple[str, str]]:
+    """Runs trials in a folder. Returns what went wrong: the column of the table, and a sentence.
+
+    Args:
+        always_refused: ``verify`` must refuse each of these recordings.
+    """
     for module in _MODULES:  # before the forks, which then need not import them
         importlib.import_module(module)
 
     base, secret = make_base(folder), make_secret(folder)
     watch = Watch(secret)
     found: list[tuple[str, str]] = []
-    for number in range(first, first + count):
+    for number, apply in changes.items():
         lab = folder / "a/b/c"
         shutil.rmtree(folder / "a", ignore_errors=True)
         (lab / "out").mkdir(parents=True)
         shutil.copytree(base, lab / "recording")
-        what = f"change {number} of seed {seed} ({change(lab / 'recording/house_0', secret, seed, number)})"
+        what = apply(lab / "recording/house_0", secret)
+        beside = _files_beside(lab)
         watch.noticed()
+        of_change = [Watch(lab / crafted.SECRET)] if (lab / crafted.SECRET).is_dir() else []
         outcome = run_readers(lab / "recording", lab / "out", number)
-        for name in watch.noticed():
-            found.append(("lost", f"{what}: secret/{name} was opened"))
+        for one in (watch, *of_change):
+            for name in one.noticed():
+                found.append(("lost", f"{what}: secret/{name} was opened"))
+        for one in of_change:
+            one.close()
         if (folder / "started").exists():
             found.append(("lost", f"{what}: a program of the recording was started"))
             (folder / "started").unlink()
         outside = {p.name for p in folder.iterdir()} - {"base", "secret", "encode", "a"} | {p.name for p in [*lab.parent.iterdir(), *lab.parent.parent.iterdir()]} - {"b", "c"}
-        if outside or {p.name for p in lab.iterdir()} != {"recording", "out"}:
+        if outside or _files_beside(lab) != beside:
             found.append(("lost", f"{what}: files were written outside of the output: {outside}"))
         if outcome.hung:
             found.append(("hung", f"{what}: {outcome.running} did not end"))
@@ -666,6 +708,8 @@ def trials(folder: Path, count: int, seed: int = 1, first: int = 0) -> list[tupl
             if outcome.seconds[name] > CPU_SECONDS:
                 found.append(("hung", f"{what}: {name} used {outcome.seconds[name]:.0f} s"))
         if outcome.ended.get("verify", ("", ""))[0] == "ok":
+            if always_refused:
+                found.append(("unnoticed", f"{what}: verify calls it intact"))
             for name, (state, text) in outcome.ended.items():
                 # MJCF, which robomimic's format needs, has no place for some fields. JSON rows may have other keys in each episode.
                 if state == "refused" and not any(limit in text for limit in ("MJCF cannot express", "an episode has no stream")):

@@ -6,8 +6,8 @@
     python tests/faults/run.py flips=1000 kills   only these kinds, with 1000 trials of flips; other lines of the table are kept
     python tests/faults/run.py --no-table ...     print only
 
-The program is build/dev/record_fake or $MJSENSE_RECORD_FAKE, for example that of a build with ASan and UBSan. `generated` also needs the
-Python package (PYTHONPATH=build/dev/python).
+The program is build/dev/record_fake or $MJSENSE_RECORD_FAKE, for example that of a build with ASan and UBSan. `generated` and
+`crafted_readers` also need the Python package (PYTHONPATH=build/dev/python).
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ import tempfile
 import time
 from pathlib import Path
 
+import crafted
 import faults
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs/faults.md"
 # Trials of the long form; None: one trial for each entry of the kind's list.
-TRIALS = {"kills": 300, "killed_changes": 200, "full_disks": 100, "full_disk_repairs": 40, "file_limits": 100, "flips": 1000, "truncations": 200, "mutations": 2000, "generated": 3000, "hostile": None, "staged": None, "encoders": None}
+TRIALS = {"kills": 300, "killed_changes": 200, "full_disks": 100, "full_disk_repairs": 40, "file_limits": 100, "flips": 1000, "truncations": 200, "mutations": 2000, "generated": 3000, "crafted_readers": len(crafted.CASES), "hostile": None, "staged": None, "encoders": None}
 HEAD = "| fault | trials | lost | unnoticed | crashed | hung |\n| --- | --- | --- | --- | --- | --- |\n"
 BEGIN, END = "<!-- table of tests/faults/run.py -->\n", "<!-- end -->"
 

@@ -79,7 +79,8 @@ def test_limits_on_the_size_of_files(lab):
     check(faults.file_limits(lab, 12))
 
 
-def test_generated_changes():
+@pytest.mark.parametrize("trials", ["generated=15", "crafted_readers=6"])
+def test_readers_of_the_package(trials):
     # A process of its own, because the trials fork, which needs a process without threads.
-    done = subprocess.run([sys.executable, ROOT / "tests/faults/run.py", "--no-table", "generated=15"], capture_output=True, text=True)
+    done = subprocess.run([sys.executable, ROOT / "tests/faults/run.py", "--no-table", trials], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -35,8 +35,9 @@ def parse_object(text: str | bytes, what: str, max_bytes: int) -> dict[str, Any]
     return value
 
 
-def require_standard(text: str, what: str) -> None:
-    """Raises ValueError for NaN and Infinity, which Python's reader accepts and which the JSON of a recording cannot have."""
+def require_standard(text: str, what: str, max_bytes: int) -> None:
+    """Raises ValueError also for NaN and Infinity, which Python's reader accepts but the JSON of a recording cannot have."""
+    parse(text, what, max_bytes)
 
     def refuse(word: str) -> None:
         raise ValueError(f"{what} is not JSON text: it has the word {word}")

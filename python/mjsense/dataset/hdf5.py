@@ -85,7 +85,8 @@ class Group:
             raise (UnknownNameError if wrong == "does not exist" else ValueError)(f"{where} {wrong}")
         with reading(where):
             found = self._group[path]
-        if hasattr(found, "dtype") and hasattr(found, "shape"):
+            is_dataset = hasattr(found, "dtype") and hasattr(found, "shape")
+        if is_dataset:
             return Rows(found, self._file, self._file_bytes, self._below(path))
         if not hasattr(found, "keys"):
             raise ValueError(f"{where} is neither a group nor a dataset")
@@ -97,9 +98,9 @@ class Group:
 
     def names(self) -> list[str]:
         """Names of the group's members."""
-        if len(self._group) > limits.NAMES:
-            raise ValueError(f"{self.where} has {len(self._group)} members, more than {limits.NAMES}")
         with reading(self.where):
+            if len(self._group) > limits.NAMES:
+                raise ValueError(f"has {len(self._group)} members, more than {limits.NAMES}")
             names = list(self._group)
         for name in names:
             if not is_plain_name(name):

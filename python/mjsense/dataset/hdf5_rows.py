@@ -33,8 +33,10 @@ class Rows:
         self._dataset, self._file_bytes = dataset, file_bytes
         self.where = f"{file} {place}"
         with reading(self.where):
+            if dataset.shape is None:
+                raise ValueError("has no value: its dataspace is empty")
             self.dtype: np.dtype[Any] = dataset.dtype
-            self.shape: tuple[int, ...] = dataset.shape or ()
+            self.shape: tuple[int, ...] = dataset.shape
             self._check_storage()
         self.attrs = Attributes(dataset, self.where)
 

@@ -31,13 +31,14 @@ class Attributes:
         self._owner, self._place = owner, place
 
     def __contains__(self, name: str) -> bool:
-        return name in self._owner.attrs
+        with reading(self._place):
+            return name in self._owner.attrs
 
     def get(self, name: str, default: Any = None) -> Any:
         """The value, or the default if there is no such attribute."""
-        attributes = self._owner.attrs
-        if name not in attributes:
+        if name not in self:
             return default
+        attributes = self._owner.attrs
         what = f"{self._place}: the attribute '{name}'"
         with reading(what):
             about = attributes.get_id(name)

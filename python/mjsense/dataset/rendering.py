@@ -25,6 +25,7 @@ from mjsense.dataset.archive import MAX_BYTES
 from mjsense.dataset.dataset import Dataset, by_house, opened
 from mjsense.dataset.episode_worlds import EpisodeWorlds, show_states
 from mjsense.dataset.hdf5 import open_h5
+from mjsense.dataset.limits import SCENE_BYTES
 from mjsense.dataset.places import read_plain
 from mjsense.dataset.playback import archive_of, inputs_of, where
 from mjsense.dataset.render_cameras import RenderCamera
@@ -226,7 +227,7 @@ class _House:
     def _finish(self, world: int, episode: Episode) -> None:
         with open_h5(episode.path) as file:
             scene = file[episode.trajectory]["obs_scene"].text()
-            bounded_json.require_standard(scene, f"{episode.path} {episode.trajectory}/obs_scene")
+            bounded_json.require_standard(scene, f"{episode.path} {episode.trajectory}/obs_scene", SCENE_BYTES)
         self._recorder.carry_over(world, str(episode.path.absolute()), episode.trajectory, self._skip)
         self._recorder.finish_episode(world, scene, episode.outcome)
 
