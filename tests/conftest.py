@@ -13,7 +13,8 @@ if path := os.environ.get("PYTHONPATH"):
     os.environ["PYTHONPATH"] = os.pathsep.join(map(os.path.abspath, path.split(os.pathsep)))
 # Debian's ffmpeg, which the C++ tests use, loads 215 libraries at each start (0.125 s of CPU time); this one none (0.012 s).
 if package := importlib.util.find_spec("imageio_ffmpeg"):
-    os.environ.setdefault("MJSENSE_FFMPEG", str(next(Path(package.origin).parent.glob("binaries/ffmpeg-*"))))
+    for program in Path(package.origin).parent.glob("binaries/ffmpeg-*"):
+        os.environ.setdefault("MJSENSE_FFMPEG", str(program))
 
 
 def pytest_configure() -> None:

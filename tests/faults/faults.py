@@ -552,19 +552,32 @@ def encoders(lab: Lab, names=None) -> Row:
 def generated(lab: Lab, trials: int) -> Row:
     """Changes a valid recording at one or two places, and runs all readers of the Python package."""
     import generated
+    import reader_trials
+
+    def change(number: int) -> reader_trials.Change:
+        return lambda house, secret: f"change {number} ({generated.change(house, secret, seed=1, number=number)})"
 
     row = Row("generated changes, read by verify, Dataset, replay, render, export, inspect and repair", trials)
-    for column, note in generated.trials(lab.fresh("generated"), generated.generated_changes(trials)):
+    for column, note in reader_trials.trials(lab.fresh("generated"), {number: change(number) for number in range(trials)}):
         row.wrong(column, note)
     return row
 
 
 def crafted_readers(lab: Lab, trials: int) -> Row:
-    """The crafted files, given to all readers of the Python package."""
-    import generated
+    """The crafted files, or so many of them at equal distances in their list, and all readers of the Python package."""
+    import reader_trials
 
-    changes = generated.crafted_changes(trials)
+    def change(name: str) -> reader_trials.Change:
+        def apply(house: Path, secret: Path) -> str:
+            (house.parent.parent / crafted.SECRET).mkdir()
+            crafted.CASES[name](house)
+            return name
+
+        return apply
+
+    names = list(crafted.CASES)
+    changes = {number: change(names[number]) for number in range(0, len(names), max(1, len(names) // trials))}
     row = Row("crafted files, read by verify, Dataset, replay, render, export, inspect and repair", len(changes))
-    for column, note in generated.trials(lab.fresh("crafted_readers"), changes, always_refused=True):
+    for column, note in reader_trials.trials(lab.fresh("crafted_readers"), changes, always_refused=True):
         row.wrong(column, note)
     return row

@@ -112,7 +112,7 @@ def write_sky(path):
 
 @pytest.fixture(scope="module")
 def videos_with(tmp_path_factory):
-    """The videos of a short recording with these options, which is made once."""
+    """A function that records an episode with image options, once for each set, and returns the folder and its videos."""
     made = {}
 
     def find(options):

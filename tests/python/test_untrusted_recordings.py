@@ -458,7 +458,7 @@ def test_a_text_of_numbers_is_named(root, tmp_path):
 
 
 def test_errors_of_the_hdf5_library_name_the_file_and_the_place(root, tmp_path):
-    """A dataset without a dataspace, a text that is not JSON, and a file whose inside is noise."""
+    """An empty dataset, a text that is not JSON, and a file whose inside is noise."""
 
     def no_value(file, place):
         del file[place]
@@ -469,21 +469,20 @@ def test_errors_of_the_hdf5_library_name_the_file_and_the_place(root, tmp_path):
         file[place] = np.frombuffer(b"noise", np.uint8)
 
     for name, edit, place, readers, message in (
-        ("empty text", no_value, "traj_0/obs_scene", READERS, r"\.h5 traj_0/obs_scene has no value: its dataspace is empty$"),
-        ("empty rows", no_value, "traj_0/rewards", READERS, r"\.h5 traj_0/rewards has no value: its dataspace is empty$"),
+        ("empty text", no_value, "traj_0/obs_scene", READERS, r"\.h5 traj_0/obs_scene is empty: it has neither a value nor rows$"),
+        ("empty rows", no_value, "traj_0/rewards", READERS, r"\.h5 traj_0/rewards is empty: it has neither a value nor rows$"),
         ("no JSON", no_json, "traj_0/obs_scene", ["render"], r"\.h5 traj_0/obs_scene is not JSON text: Expecting value: line 1 column 1"),
     ):
         data = shutil.copytree(root, tmp_path / name)
         with h5py.File(file_of(data), "a") as file:
             edit(file, place)
         refused = refusals(data, tmp_path / f"out of {name}", readers)
-        assert refused and all(re.search(message, text) for text in refused.values()), (name, refused)
+        assert refused.keys() == set(readers) and all(re.search(message, text) for text in refused.values()), (name, refused)
         assert errors_of(data), name
     path = file_of(root)
     path.write_bytes(path.read_bytes()[:2048] + np.random.default_rng(0).bytes(path.stat().st_size - 2048))
     refused = refusals(root, tmp_path, READERS)
     assert refused.keys() == READERS.keys() and all(path.name in text for text in refused.values()), refused
-
 
 
 def test_a_unit_of_the_model_that_is_no_text_is_reported(root):

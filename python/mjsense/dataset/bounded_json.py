@@ -9,16 +9,21 @@ from typing import Any
 from mjsense.dataset.limits import JSON_DEPTH, JSON_VALUES
 
 
-def parse(text: str | bytes, what: str, max_bytes: int, max_values: int = JSON_VALUES) -> Any:
+def parse(text: str | bytes, what: str, max_bytes: int, max_values: int = JSON_VALUES, standard: bool = False) -> Any:
     """The value of a JSON text.
 
     Args:
         what: What has the text, for errors: ``"data/house_0/x.h5: the attribute 'recording'"``.
+        standard: Refuse NaN and Infinity, which Python's reader accepts and the JSON of a recording cannot have.
     """
+
+    def refuse(word: str) -> None:
+        raise ValueError(f"it has the word {word}")
+
     if len(text) > max_bytes:
         raise ValueError(f"{what} has {len(text)} bytes, more than {max_bytes}")
     try:
-        value = json.loads(text)
+        value = json.loads(text, parse_constant=refuse if standard else None)
     except RecursionError:
         raise ValueError(f"{what} is nested deeper than {JSON_DEPTH} levels") from None
     except ValueError as error:  # also of invalid UTF-8 and numbers of too many digits
@@ -33,16 +38,6 @@ def parse_object(text: str | bytes, what: str, max_bytes: int) -> dict[str, Any]
     if not isinstance(value, dict):
         raise ValueError(f"{what} is {kind_of(value)}, not an object")
     return value
-
-
-def require_standard(text: str, what: str, max_bytes: int) -> None:
-    """Raises ValueError also for NaN and Infinity, which Python's reader accepts but the JSON of a recording cannot have."""
-    parse(text, what, max_bytes)
-
-    def refuse(word: str) -> None:
-        raise ValueError(f"{what} is not JSON text: it has the word {word}")
-
-    json.loads(text, parse_constant=refuse)
 
 
 def kind_of(value: Any) -> str:

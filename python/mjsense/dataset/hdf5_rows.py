@@ -34,7 +34,7 @@ class Rows:
         self.where = f"{file} {place}"
         with reading(self.where):
             if dataset.shape is None:
-                raise ValueError("has no value: its dataspace is empty")
+                raise ValueError("is empty: it has neither a value nor rows")
             self.dtype: np.dtype[Any] = dataset.dtype
             self.shape: tuple[int, ...] = dataset.shape
             self._check_storage()

@@ -227,7 +227,7 @@ class _House:
     def _finish(self, world: int, episode: Episode) -> None:
         with open_h5(episode.path) as file:
             scene = file[episode.trajectory]["obs_scene"].text()
-            bounded_json.require_standard(scene, f"{episode.path} {episode.trajectory}/obs_scene", SCENE_BYTES)
+            bounded_json.parse(scene, f"{episode.path} {episode.trajectory}/obs_scene", SCENE_BYTES, standard=True)
         self._recorder.carry_over(world, str(episode.path.absolute()), episode.trajectory, self._skip)
         self._recorder.finish_episode(world, scene, episode.outcome)
 

@@ -167,11 +167,12 @@ std::string fingerprint(const RecordingCfg& cfg, const RecordingPlan& plan,
   return j.dump();
 }
 
-class Planner {
+// Assigns paths to the streams of sensors, one after the other.
+class PlanBuilder {
  public:
-  explicit Planner(const RecordingCfg& cfg) : cfg_(cfg) {}
+  explicit PlanBuilder(const RecordingCfg& cfg) : cfg_(cfg) {}
 
-  RecordingPlan plan() {
+  RecordingPlan build() {
     for (const char* own : kOwnPaths) claim(own, "the recorder");
     for (const char* group : standard_groups()) claim(group, "the layout");
     for (const Sensor* sensor : cfg_.sensors) add(sensor);
@@ -209,7 +210,7 @@ class Planner {
 
   // One dataset with the text of all fields, and a dataset for each field of numbers.
   void add_text(const Sensor& sensor, const SensorSpec& text) {
-    note(sensor, text);
+    add_to_fingerprint(sensor, text);
     add_array(sensor, {.spec = text, .text = std::make_shared<JsonRows>(sensor, text.str_max_len)});
     for (const Field& field : sensor.fields()) {
       if (!has_numbers(sensor, field)) continue;
@@ -222,7 +223,7 @@ class Planner {
   void add_field(const Sensor& sensor, const Field& field) {
     const bool array = field.spec.storage == Storage::kArray;
     if (!cfg_.videos && !array) return;
-    note(sensor, field.spec);
+    add_to_fingerprint(sensor, field.spec);
     if (array) {
       add_array(sensor,
                 {.spec = field.spec, .field = &field, .present = presence_of(sensor, field)});
@@ -251,8 +252,7 @@ class Planner {
     plan_.arrays.push_back(std::move(stream));
   }
 
-  // Adds a stream to the fingerprint.
-  void note(const Sensor& sensor, const SensorSpec& spec) {
+  void add_to_fingerprint(const Sensor& sensor, const SensorSpec& spec) {
     check_path(sensor.name(), spec.name);
     streams_.push_back(fmt::format("{} {}{}", spec.name, dtype_name(spec.dtype), spec.shape.str()));
   }
@@ -304,7 +304,7 @@ std::size_t ArrayStream::row_bytes() const { return spec.shape.size() * dtype_si
 
 std::size_t ArrayStream::kept_bytes() const { return text ? text->row_bytes() : row_bytes(); }
 
-RecordingPlan plan_recording(const RecordingCfg& cfg) { return Planner(cfg).plan(); }
+RecordingPlan plan_recording(const RecordingCfg& cfg) { return PlanBuilder(cfg).build(); }
 
 Batches batches_of(int episodes, int batches) {
   if (episodes <= 0)

@@ -203,7 +203,8 @@ class Connections:
             raise ValueError(f"{self.url} sent a message of more than {MAX_BYTES} bytes, the limit") from None
         if error.rcvd is not None and error.rcvd.code == _TOO_BIG:
             raise ValueError(
-                f"{self.url} refuses the observation of {sent} bytes: it is larger than the server's limit"
+                f"{self.url} refuses the observation of {sent} bytes: it is larger than the server's limit, which "
+                "is higher with fewer --connections of `mjsense serve`"
             ) from None
 
     def _without_redirects(self) -> Any:
