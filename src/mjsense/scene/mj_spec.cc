@@ -103,9 +103,8 @@ SpecPtr parse_model(const ModelSource& source, std::string_view context) {
     throw ValueError(fmt::format("{}: no model; give a path or an XML text", context));
   if (source.path.starts_with(kEmbedded)) {
     const std::string name = source.path.substr(kEmbedded.size());
-    embedded_file(name);  // throws with the nearest names
-    for (const EmbeddedFile& file : embedded_files())
-      vfs.add(std::string(file.name), file.text, context);
+    // Embedded models name no other files.
+    vfs.add(name, embedded_file(name), context);
     return checked(call_mujoco(mj_parseXML, name.c_str(), vfs.get(), error, sizeof error), error,
                    context);
   }
