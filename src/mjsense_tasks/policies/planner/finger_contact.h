@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <vector>
 
 #include "mjsense/core/pose.h"
 
@@ -25,6 +26,18 @@ struct FingerContact {
   // increase of the width along the approach (m per m); the object slips out if it is large
   double slope = 0;
 };
+
+// The points with a coordinate from `from` to `to` along the approach, and those within rounding of
+// these limits: a superset of the points that measure_finger_contact() finds between the pads there.
+inline void points_between(std::span<const Vec3> points, Vec3 approach, double from, double to,
+                           std::vector<Vec3>& out) {
+  constexpr double kRounding = 1e-9;  // m
+  out.clear();
+  for (Vec3 p : points) {
+    const double v = dot(p, approach);
+    if (v >= from - kRounding && v <= to + kRounding) out.push_back(p);
+  }
+}
 
 inline FingerContact measure_finger_contact(std::span<const Vec3> points, Vec3 center, Vec3 close,
                                             Vec3 across, Vec3 approach, double half_width,

@@ -108,16 +108,19 @@ std::vector<Grasp> propose_grasps(const GripperShape& gripper, const episode::Ob
                half_width = 0.9 * gripper.pad_half_width;
 
   std::vector<Grasp> grasps;
+  std::vector<Vec3> reached;
   const int levels = highest - lowest < 0.01 ? 1 : 4;
   for (int level = 0; level < levels; ++level) {
     const double z = levels == 1 ? lowest : lowest + (highest - lowest) * level / (levels - 1);
+    const double pads = z - gripper.pad_middle;
+    points_between(points, {0, 0, 1}, pads - half_length, pads + half_length, reached);
     for (int k = 0; k < kYaws; ++k) {
       const double yaw = yaw0 + pi * k / kYaws;
       const Vec3 close{std::cos(yaw), std::sin(yaw), 0}, across{-close.y, close.x, 0};
       for (double slide : kSlides) {
         const Vec3 center = Vec3{object.p.x, object.p.y, z} + slide * across;
         const FingerContact s =
-            measure_finger_contact(points, center - Vec3{0, 0, gripper.pad_middle}, close, across,
+            measure_finger_contact(reached, center - Vec3{0, 0, gripper.pad_middle}, close, across,
                                    {0, 0, 1}, half_width, half_length);
         const double width = s.high - s.low;
         if (!(width > kMinWidth && width < gripper.max_opening - 2 * kSideGap) ||

@@ -90,6 +90,7 @@ std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const episode:
   const double half_length = 0.9 * gripper.pad_half_length,
                half_width = 0.9 * gripper.pad_half_width;
   std::vector<Grasp> grasps;
+  std::vector<Vec3> reached;
   for (Vec3 close : closing_directions()) {
     const Vec3 first = some_normal(close);
     for (int k = 0; k < kApproaches; ++k) {
@@ -105,10 +106,12 @@ std::vector<Grasp> grasps_all_around(const GripperShape& gripper, const episode:
       for (double end : kDepths) {
         const double depth = end - half_length - gripper.pad_middle;
         if (near + depth > mid + 0.002) break;
+        const double pads = dot(middle, approach) + near + depth + gripper.pad_middle;
+        points_between(points, approach, pads - half_length, pads + half_length, reached);
         for (double slide : kAnyDirectionSlides) {
           const Vec3 center = middle + (near + depth) * approach + slide * across;
           const FingerContact s =
-              measure_finger_contact(points, center + gripper.pad_middle * approach, close, across,
+              measure_finger_contact(reached, center + gripper.pad_middle * approach, close, across,
                                      approach, half_width, half_length);
           const double width = s.high - s.low;
           ++count.candidates;
