@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -32,12 +33,15 @@ class ContentKey {
 // 64-bit hash (XXH3) that also depends on `seed`.
 [[nodiscard]] std::uint64_t hash_of(std::span<const std::byte> bytes, std::uint64_t seed);
 
-// Cache of objects of one type. It holds weak references only, so an object is released with its
-// last owner. Thread-safe; if two threads build the same object at the same time, the first result
-// is kept.
+// Cache of objects of one type. An object is released with its last owner, except for the objects
+// that were used last. Thread-safe; if two threads build the same object at the same time, the
+// first result is kept.
 template <class T>
 class ContentCache {
  public:
+  // `most`: how many objects stay without an owner.
+  explicit ContentCache(std::size_t most = 0) : most_(most) {}
+
   template <class Make>
   std::shared_ptr<const T> get(const ContentKey& key, Make&& make) {
     if (auto found = find(key)) return found;
@@ -47,18 +51,29 @@ class ContentCache {
     std::weak_ptr<const T>& place = kept_[key];
     if (auto first = place.lock()) return first;
     place = made;
-    return made;
+    return used(made);
   }
 
  private:
   std::shared_ptr<const T> find(const ContentKey& key) {
     const std::lock_guard lock(mutex_);
     const auto found = kept_.find(key);
-    return found == kept_.end() ? nullptr : found->second.lock();
+    return found == kept_.end() ? nullptr : used(found->second.lock());
   }
 
+  std::shared_ptr<const T> used(std::shared_ptr<const T> object) {
+    if (most_ > 0 && object) {
+      std::erase(last_, object);
+      last_.push_back(object);
+      if (last_.size() > most_) last_.pop_front();
+    }
+    return object;
+  }
+
+  std::size_t most_;
   std::mutex mutex_;
   std::map<ContentKey, std::weak_ptr<const T>> kept_;
+  std::deque<std::shared_ptr<const T>> last_;
 };
 
 }  // namespace mjsense
