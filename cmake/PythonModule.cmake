@@ -8,6 +8,7 @@ find_package(nanobind CONFIG REQUIRED NO_CMAKE_FIND_ROOT_PATH)
 
 file(GLOB_RECURSE MJSENSE_PY_SOURCES CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/python/bindings/*.cc)
 nanobind_add_module(mjsense_python BACKEND_MODULE nanobind_backend NOMINSIZE NB_SUPPRESS_WARNINGS ${MJSENSE_PY_SOURCES})
+mjsense_unity(mjsense_python 4 ${MJSENSE_PY_SOURCES})
 target_include_directories(mjsense_python PRIVATE ${PROJECT_SOURCE_DIR} ${MUJOCO_DIR}/include)
 target_compile_definitions(mjsense_python PRIVATE MJSENSE_VERSION="${PROJECT_VERSION}")
 target_compile_options(mjsense_python PRIVATE -Wall -Wextra -Wno-missing-field-initializers)

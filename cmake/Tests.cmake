@@ -16,6 +16,7 @@ foreach(folder IN LISTS MJSENSE_ROOMS)
   endif()
   if(tests)
     add_executable(${room}_test ${tests})
+    mjsense_unity(${room}_test 4 ${tests})
     if(folder MATCHES "/mjsense_tasks/")
       set(library mjsense_tasks ${MJSENSE_ALL_LIBS})
     else()
@@ -37,6 +38,11 @@ foreach(folder IN LISTS MJSENSE_ROOMS)
     endif()
   endif()
 endforeach()
+
+# The longest program is started first, so that the others run at the same time.
+if(TARGET policies_test)
+  set_tests_properties(policies PROPERTIES COST 1000)
+endif()
 
 # Tests of the kernels as on a CPU without wide vectors.
 if("avx2" IN_LIST MJSENSE_ISAS)

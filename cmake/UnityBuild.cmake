@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-# mjsense_unity(TARGET SOURCE...): compiles up to eight files of a room together, because most files spend more time on the headers
+# mjsense_unity(TARGET SIZE SOURCE...): compiles up to SIZE files of a room together, because most files spend more time on the headers
 # that they include than on their own lines: without ccache, both libraries take 305 instead of 585 CPU seconds (preset dev). Files
 # with compile options of their own (cmake/Isa.cmake) are compiled alone. Missing includes of a file are found by ./dev check, in which
 # clang examines each file alone.
-function(mjsense_unity target)
+function(mjsense_unity target size)
   set(sources ${ARGN})
   list(FILTER sources INCLUDE REGEX "\\.cc$")
   list(SORT sources)
@@ -12,7 +12,7 @@ function(mjsense_unity target)
     get_source_file_property(options ${file} COMPILE_OPTIONS)
     if(NOT options)
       math(EXPR count_${room} "0${count_${room}} + 1")
-      math(EXPR group "(${count_${room}} - 1) / 8")
+      math(EXPR group "(${count_${room}} - 1) / ${size}")
       set_source_files_properties(${file} PROPERTIES UNITY_GROUP ${room}${group})
     endif()
   endforeach()

@@ -25,14 +25,14 @@ namespace nb = nanobind;
 
 namespace {
 
-using Array = nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu>;
+using AnyArray = nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu>;
 
 render::NamedArrays named_arrays(const nb::dict& arrays) {
   render::NamedArrays out;
   for (auto [key, value] : arrays) {
     const auto name = nb::cast<std::string>(key);
-    Array array;
-    if (!nb::try_cast<Array>(value, array))
+    AnyArray array;
+    if (!nb::try_cast<AnyArray>(value, array))
       throw ValueError("the model's field '" + name + "' is not a contiguous array");
     render::NamedArray& named = out[name];
     named.data = const_cast<void*>(static_cast<const void*>(array.data()));

@@ -194,12 +194,12 @@ CASES = [("pick", "varied_table", "franka"), ("pick", "clutter", "franka"), ("pi
 
 
 def test_every_phrase_is_true_of_one_object():
-    """770 episodes; at most one in ten has the sentence of another one."""
+    """490 episodes; at most one in ten has the sentence of another one."""
     everything, checked = set(), 0
     for task, place, robot in CASES:
         scene = scene_file(place)
         sentences = set()
-        for env, world in starts(task, place, robot, 110):
+        for env, world in starts(task, place, robot, 70):
             sentence = env.instructions[world]
             sentences.add(sentence)
             start = Start(env, world, scene, "robot_0/base")
@@ -216,10 +216,10 @@ def test_every_phrase_is_true_of_one_object():
             for match, body in zip(found, wanted, strict=True):
                 assert fitting(start, match, surfaces) == [body], (task, sentence, match[0])
                 checked += 1
-        assert len(sentences) >= 99, (task, sorted(sentences))
+        assert len(sentences) >= 63, (task, sorted(sentences))
         everything |= sentences
-    assert checked >= 1000
-    assert len(everything) >= 693, len(everything)
+    assert checked >= 640
+    assert len(everything) >= 441, len(everything)
 
 
 def test_doors_are_pushed_or_pulled():

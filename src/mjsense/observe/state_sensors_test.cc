@@ -15,14 +15,14 @@
 namespace mjsense::observe {
 namespace {
 
-using testing::ElementsAre;
-using testing::FloatNear;
-using testing::HasSubstr;
-using testing::Pointwise;
+using ::testing::ElementsAre;
+using ::testing::FloatNear;
+using ::testing::HasSubstr;
+using ::testing::Pointwise;
 
 // A base with one hinge 0.58 m above the floor and a tool site; a cube; a camera that looks along
 // +x.
-constexpr char kScene[] = R"(
+constexpr char kStateScene[] = R"(
 <mujoco>
   <worldbody>
     <geom name="floor" type="plane" size="2 2 .1"/>
@@ -44,7 +44,7 @@ constexpr char kScene[] = R"(
 std::vector<JointGroup> groups() { return {{"base", {}, {}}, {"arm", {0}, {0}}}; }
 
 TEST(JointState, HasOneStreamPerGroup) {
-  TestWorld w(kScene);
+  TestWorld w(kStateScene);
   w.data->qpos[0] = 0.05;
   w.data->qvel[0] = -1e-5;
   JointStateSensor qpos("qpos", JointStateSensor::What::kPosition, groups());
@@ -73,7 +73,7 @@ TEST(JointState, UnitsAreThoseOfTheJoints) {
 }
 
 TEST(JsonFunction, RefusesTextLongerThanTheRow) {
-  TestWorld w(kScene);
+  TestWorld w(kStateScene);
   std::string word = "short";
   JsonFunctionSensor info("task_info", 16, "", [&](const World&, JsonWriter& json) {
     json.begin_object().key("w").value(word).end_object();
@@ -93,7 +93,7 @@ TEST(JsonFunction, RefusesTextLongerThanTheRow) {
 }
 
 TEST(Pose, OfASiteInTheBaseFrame) {
-  TestWorld w(kScene);
+  TestWorld w(kStateScene);
   PoseSensor base("robot_base_pose", {"body", "robot/base"});
   PoseSensor tcp("tcp_pose", {"site", "robot/tool"}, {"body", "robot/base"});
   w.compute(base);
@@ -108,7 +108,7 @@ TEST(Pose, OfASiteInTheBaseFrame) {
 // A quaternion and its negative are the same rotation: which of them it is does not change between
 // steps, over two turns.
 TEST(Pose, QuaternionIsContinuousWithinAnEpisode) {
-  TestWorld w(kScene);
+  TestWorld w(kStateScene);
   PoseSensor tcp("tcp_pose", {"site", "robot/tool"}, {"body", "robot/base"});
   tcp.initialize(w.init());
   const auto at = [&](double angle) {
@@ -136,7 +136,7 @@ TEST(Pose, QuaternionIsContinuousWithinAnEpisode) {
 }
 
 TEST(Pose, NamesTheNearestWhenThereIsNone) {
-  TestWorld w(kScene);
+  TestWorld w(kStateScene);
   PoseSensor tcp("tcp_pose", {"site", "robot/tol"});
   try {
     tcp.initialize(w.init());
@@ -149,7 +149,7 @@ TEST(Pose, NamesTheNearestWhenThereIsNone) {
 }
 
 TEST(EnvStates, ContainsEveryFreeBodyAndTheRobot) {
-  TestWorld w(kScene);
+  TestWorld w(kStateScene);
   w.data->qpos[0] = 0.25;
   w.data->qvel[0] = -2;
   for (int i = 0; i < 6; ++i) w.data->qvel[1 + i] = i;
@@ -247,15 +247,15 @@ TEST(EnvStates, ActorsWithTheSameNameKeepTheirEntities) {
 }
 
 TEST(CameraParameters, ProjectKnownPoints) {
-  TestWorld w(kScene);
+  TestWorld w(kStateScene);
   CameraParameterSensor camera("sensor_param_camera", "camera", 640, 368);
   w.compute(camera);
   const auto X = values<double>(camera, "cam2world_gl");
   const auto E = values<double>(camera, "extrinsic_cv");
   const auto K = values<double>(camera, "intrinsic_cv");
   // The camera looks along +x from (0, 0, 1): right is -y, down is -z.
-  EXPECT_THAT(
-      X, Pointwise(testing::DoubleNear(1e-12), {0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 1}));
+  EXPECT_THAT(X, Pointwise(::testing::DoubleNear(1e-12),
+                           {0, 0, 1, 0, -1, 0, 0, 0, 0, -1, 0, 1, 0, 0, 0, 1}));
   const double f = static_cast<float>(184 / std::tan(std::numbers::pi / 6));
   EXPECT_THAT(K, ElementsAre(f, 0, 320, 0, f, 184, 0, 0, 1));
 
@@ -303,7 +303,7 @@ TEST(CameraParameters, APictureHasPixels) {
 }
 
 TEST(CameraParameters, MatrixOfACameraWithASensor) {
-  TestWorld w(kScene);
+  TestWorld w(kStateScene);
   CameraParameterSensor camera("sensor_param_chip", "chip", 640, 480);
   w.compute(camera);
   // 640 pixels on 4 mm. MuJoCo's principal point is that of the sensor in the frame of the lens.
@@ -311,7 +311,7 @@ TEST(CameraParameters, MatrixOfACameraWithASensor) {
   const double pixel = 640 / .004;
   const std::vector<double> expected = {
       .003 * pixel, 0, 320 - .0002 * pixel, 0, .0025 * pixel, 240 + .0001 * pixel, 0, 0, 1};
-  EXPECT_THAT(K, Pointwise(testing::DoubleNear(1e-3), expected));
+  EXPECT_THAT(K, Pointwise(::testing::DoubleNear(1e-3), expected));
   CameraParameterSensor map("sensor_param_map", "map", 640, 480);
   EXPECT_THROW(w.compute(map), ValueError);
 }

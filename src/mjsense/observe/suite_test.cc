@@ -32,7 +32,7 @@ TEST(Suite, KeepsOrderAndNamesBothOwnersOfADuplicate) {
   suite.add(std::make_shared<Picture>("qpos"), "task 'pick'");
   suite.add(std::make_shared<Picture>("exo"), "task 'pick'");
   suite.add(std::make_shared<Picture>("arm"), "robot 'franka'");
-  EXPECT_THAT(suite.names(), testing::ElementsAre("qpos", "exo", "arm"));
+  EXPECT_THAT(suite.names(), ::testing::ElementsAre("qpos", "exo", "arm"));
   EXPECT_EQ(suite.owner("arm"), "robot 'franka'");
   EXPECT_EQ(error_of([&] { suite.add(std::make_shared<Picture>("qpos"), "robot 'franka'"); }),
             "'qpos' is a duplicated sensor uuid: from task 'pick' and from robot 'franka'");
@@ -40,7 +40,7 @@ TEST(Suite, KeepsOrderAndNamesBothOwnersOfADuplicate) {
   EXPECT_EQ(error_of([&] { suite.get("qpo"); }),
             "suite: no sensor named 'qpo'; did you mean 'qpos'?");
   EXPECT_EQ(suite.find("qpo"), nullptr);
-  EXPECT_THAT(error_of([&] { suite.refresh(); }), testing::HasSubstr("bind()"));
+  EXPECT_THAT(error_of([&] { suite.refresh(); }), ::testing::HasSubstr("bind()"));
 }
 
 TEST(Suite, SelectKeepsTheGivenSensorsInOrder) {
@@ -48,10 +48,11 @@ TEST(Suite, SelectKeepsTheGivenSensorsInOrder) {
   for (const char* name : {"a", "b", "c"}) suite.add(std::make_shared<Picture>(name), name);
   const std::vector<std::string> wanted{"c", "a"}, twice{"c", "c"}, unknown{"d"};
   suite.select(wanted);
-  EXPECT_THAT(suite.names(), testing::ElementsAre("c", "a"));
+  EXPECT_THAT(suite.names(), ::testing::ElementsAre("c", "a"));
   EXPECT_EQ(suite.owner("c"), "c");
   EXPECT_EQ(error_of([&] { suite.select(twice); }), "suite: sensor 'c' is given twice");
-  EXPECT_THAT(error_of([&] { suite.select(unknown); }), testing::HasSubstr("no sensor named 'd'"));
+  EXPECT_THAT(error_of([&] { suite.select(unknown); }),
+              ::testing::HasSubstr("no sensor named 'd'"));
   EXPECT_EQ(suite.size(), 2u) << "as it was";
 }
 
@@ -63,7 +64,7 @@ TEST(Suite, BelongsToOneSimulation) {
   SensorSuite suite;
   suite.bind(one);
   EXPECT_EQ(error_of([&] { suite.bind(one); }), "");
-  EXPECT_THAT(error_of([&] { suite.bind(other); }), testing::HasSubstr("one simulation"));
+  EXPECT_THAT(error_of([&] { suite.bind(other); }), ::testing::HasSubstr("one simulation"));
 }
 
 TEST(Suite, ExtendKeepsSensorsBeforeADuplicate) {
@@ -72,7 +73,7 @@ TEST(Suite, ExtendKeepsSensorsBeforeADuplicate) {
                                           std::make_shared<Picture>("a"),
                                           std::make_shared<Picture>("b")};
   EXPECT_NE(error_of([&] { suite.extend(more); }), "");
-  EXPECT_THAT(suite.names(), testing::ElementsAre("a"));
+  EXPECT_THAT(suite.names(), ::testing::ElementsAre("a"));
 }
 
 TEST(SharedField, SharesMemoryUnderAnotherNameAndShape) {
@@ -100,7 +101,7 @@ TEST(SharedField, SharesMemoryUnderAnotherNameAndShape) {
       error_of([&] { wrong.initialize(w.init(2)); }),
       "sensor 'wrist_depth', which shows 'wrist': no field named 'dept'; did you mean 'depth'?");
   SharedField small("wrist_depth", camera, "depth", [](SensorSpec& spec) { spec.shape = {2}; });
-  EXPECT_THAT(error_of([&] { small.initialize(w.init(2)); }), testing::HasSubstr("cannot share"));
+  EXPECT_THAT(error_of([&] { small.initialize(w.init(2)); }), ::testing::HasSubstr("cannot share"));
 }
 
 }  // namespace

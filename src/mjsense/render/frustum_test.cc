@@ -16,7 +16,7 @@
 namespace mjsense::render {
 namespace {
 
-using testing::kFlat;
+using testing::kAmbient;
 using testing::Picture;
 using testing::TestRenderer;
 
@@ -24,7 +24,7 @@ using testing::TestRenderer;
 std::string crowd(int count, const std::string& lights = "") {
   Rng rng(3, 0, 0, 0);
   const char* types[] = {"box", "sphere", "capsule", "ellipsoid", "cylinder"};
-  std::string xml = (lights.empty() ? kFlat : "") + ("<worldbody>" + lights) +
+  std::string xml = (lights.empty() ? kAmbient : "") + ("<worldbody>" + lights) +
                     "<geom type='plane' size='0 0 1'/>";
   for (int i = 0; i < count; ++i) {
     const std::string geom =

@@ -10,8 +10,8 @@ namespace mjsense::render {
 namespace {
 
 using testing::expect_pixel;
+using testing::kAmbient;
 using testing::kDark;
-using testing::kFlat;
 using testing::kMatte;
 using testing::Pixel;
 using testing::TestRenderer;

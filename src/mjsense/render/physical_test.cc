@@ -13,6 +13,8 @@ namespace mjsense::render {
 namespace {
 
 using testing::kDark;
+using testing::kX;
+using testing::kY;
 using testing::Picture;
 using testing::TestRenderer;
 
@@ -32,8 +34,6 @@ PhysicalOptions linear(double radiance) {
   out.environment = upright_environment([=](double) { return radiance; });
   return out;
 }
-
-constexpr std::array<double, 3> kX{1, 0, 0}, kY{0, 1, 0};
 
 // The sphere reflects all light, so that it has the radiance of the room: it is invisible.
 TEST(Physical, WhiteSphereVanishesInWhiteRoom) {

@@ -17,8 +17,8 @@ namespace mjsense::render {
 namespace {
 
 using testing::expect_pixel;
+using testing::kAmbient;
 using testing::kDark;
-using testing::kFlat;
 using testing::kMatte;
 using testing::Pixel;
 using testing::TestRenderer;
@@ -80,7 +80,7 @@ TEST(Shading, ShadowsHaveSharpEdges) {
 }
 
 TEST(Texture, PlaneStartsAtTheCornerAndRepeats) {
-  TestRenderer s(std::string(kFlat) +
+  TestRenderer s(std::string(kAmbient) +
                  R"(<asset><texture name="t" type="2d" builtin="flat" width="2" height="2"/>
     <material name="m" texture="t" texrepeat="2 1"/></asset><worldbody>
     <geom type="plane" size="1 1 1" material="m"/></worldbody>)");
@@ -98,7 +98,7 @@ TEST(Texture, PlaneStartsAtTheCornerAndRepeats) {
 TEST(Texture, CubeFacesAndSkyFollowOpenGL) {
   const std::array<Pixel, 6> faces{
       {{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {255, 255, 0}, {0, 255, 255}, {255, 0, 255}}};
-  TestRenderer s(std::string(kFlat) +
+  TestRenderer s(std::string(kAmbient) +
                  R"(<asset><texture name="t" type="cube" builtin="flat" width="8" height="48"/>
     <texture name="sky" type="skybox" builtin="flat" width="8" height="48"/><material name="m" texture="t"/></asset>
     <worldbody><geom type="box" size=".5 .4 .3" material="m"/></worldbody>)");
@@ -116,7 +116,7 @@ TEST(Texture, CubeFacesAndSkyFollowOpenGL) {
 
 // Each face shows the one square image; its left and right halves have different colours.
 TEST(Texture, ASquareCubeMapHasTheSameImageOnAllFaces) {
-  TestRenderer s(std::string(kFlat) +
+  TestRenderer s(std::string(kAmbient) +
                  R"(<asset><texture name="t" type="cube" builtin="flat" width="8" height="48"/>
     <material name="m" texture="t"/></asset>
     <worldbody><geom type="box" size=".5 .5 .5" material="m"/></worldbody>)");
@@ -166,14 +166,15 @@ TEST(Shading, HazeIsWhereTheFloorMeetsTheSky) {
 }
 
 TEST(Shading, TransparentGeomsAreDrawnTwice) {
-  TestRenderer s(std::string(kFlat) + R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 1 1 1"/>
+  TestRenderer s(std::string(kAmbient) +
+                 R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 1 1 1"/>
     <geom type="box" size=".5 .5 .1" pos="0 0 .5" rgba="0 0 0 .5"/></worldbody>)");
   expect_pixel(s.from_above(0, 0), {64, 64, 64});  // 1 * (1 - .5)^2
 }
 
 TEST(Shading, FloorReflectsByItsReflectance) {
   TestRenderer s(
-      std::string(kFlat) +
+      std::string(kAmbient) +
       R"(<asset><material name="mirror" rgba="0 0 .2 1" reflectance=".5"/></asset><worldbody>
     <geom type="plane" size="5 5 1" material="mirror"/><geom type="box" size=".5 .1 .5" pos="0 1 1" rgba="1 0 0 1"/>
     </worldbody>)");
@@ -220,7 +221,7 @@ TEST(Kernels, EveryInstructionSetRendersTheSameImage) {
 
 TEST(Shading, SamplesSoftenEdges) {
   TestRenderer s(
-      std::string(kFlat) +
+      std::string(kAmbient) +
       R"(<worldbody><geom type="box" size=".5 .5 .5" rgba="1 1 1 1" euler="0 0 20"/></worldbody>)");
   const auto partly = [](const std::vector<std::uint8_t>& image) {
     int n = 0;

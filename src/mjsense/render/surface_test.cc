@@ -15,8 +15,8 @@ namespace mjsense::render {
 namespace {
 
 using testing::expect_pixel;
+using testing::kAmbient;
 using testing::kDark;
-using testing::kFlat;
 using testing::kMatte;
 using testing::Picture;
 using testing::Pixel;
@@ -26,7 +26,7 @@ constexpr Pixel kRed{255, 0, 0}, kGreen{0, 255, 0}, kBlue{0, 0, 255}, kWhite{255
 
 // A texture with four quadrants: red and green above, blue and white below.
 std::string painted(const char* geoms, const char* material = "") {
-  return std::string(kFlat) +
+  return std::string(kAmbient) +
          R"(<asset><texture name="t" type="2d" builtin="flat" width="32" height="32"/>
     <material name="m" texture="t" )" +
          material + R"(/></asset><worldbody>)" + geoms + "</worldbody>";
@@ -102,7 +102,7 @@ TEST(Texture, FirstRowIsAtPlusYOnTopOfABox) {
 // A mesh uses the texture coordinates of its corners. u points right; the direction of v is
 // MuJoCo's choice.
 TEST(Texture, UsesTheTexcoordsOfAMesh) {
-  TestRenderer s(std::string(kFlat) +
+  TestRenderer s(std::string(kAmbient) +
                  R"(<asset><texture name="t" type="2d" builtin="flat" width="2" height="2"/>
     <material name="m" texture="t"/><mesh name="sheet" inertia="shell" vertex="-1 -1 0 1 -1 0 1 1 0 -1 1 0"
     texcoord="0 1 1 1 1 0 0 0" face="0 1 2 0 2 3"/></asset><worldbody><geom type="mesh" mesh="sheet" material="m" contype="0" conaffinity="0"/></worldbody>)");
@@ -125,7 +125,7 @@ TEST(Texture, UsesTheTexcoordsOfAMesh) {
 
 // A pixel shows the mean of a texture that is finer than the pixels.
 TEST(Texture, IsFilteredIfFinerThanPixels) {
-  TestRenderer s(std::string(kFlat) +
+  TestRenderer s(std::string(kAmbient) +
                  R"(<asset><texture name="t" type="2d" builtin="flat" width="64" height="64"/>
     <material name="m" texture="t" texrepeat="40 40"/></asset><worldbody><geom type="plane" size="5 5 1" material="m"/></worldbody>)");
   s.paint(0, [](int i) { return (i % 64 + i / 64) % 2 ? kWhite : Pixel{0, 0, 0}; });
@@ -164,7 +164,7 @@ TEST(Triangles, OfABoxRenderLikeTheBox) {
     for (const double distance :
          {0.7, 1.5, 9.0}) {  // larger than the image, inside it, and a few pixels
       const auto see = [&](const char* shape) {
-        TestRenderer s(std::string(kFlat) + mesh + "<worldbody><geom rgba='1 .5 .2 1' " + shape +
+        TestRenderer s(std::string(kAmbient) + mesh + "<worldbody><geom rgba='1 .5 .2 1' " + shape +
                        " " + pose + "/></worldbody>");
         return s.take({0.1, -distance, 0.1}, {1, 0, 0}, {0, 0, 1},
                       grid_from_fovy(80, 60, 50, false));
@@ -195,7 +195,7 @@ TEST(Triangles, OfABoxRenderLikeTheBox) {
 // The front of an open sheet is where its corners are counterclockwise. From behind it is
 // invisible.
 TEST(Triangles, AreVisibleFromTheFrontOnly) {
-  TestRenderer s(std::string(kFlat) +
+  TestRenderer s(std::string(kAmbient) +
                  R"(<asset><mesh name="sheet" inertia="shell" vertex="-1 -1 0 1 -1 0 1 1 0 -1 1 0"
     face="0 1 2 0 2 3"/></asset><worldbody><geom type="mesh" mesh="sheet" rgba="1 1 1 1" contype="0" conaffinity="0"/></worldbody>)");
   for (const double height : {0.5, 40.0}) {
@@ -218,7 +218,7 @@ TEST(Triangles, AreVisibleFromTheFrontOnly) {
 
 TEST(Surface, HigherIdWinsIfSurfacesCoincide) {
   for (const char* shape : {"type='box' size='.3 .3 .3'", "type='mesh' mesh='block'"}) {
-    TestRenderer s(std::string(kFlat) +
+    TestRenderer s(std::string(kAmbient) +
                    R"(<asset><mesh name="block" vertex="-.3 -.3 -.3 .3 -.3 -.3 -.3 .3 -.3 .3 .3 -.3
       -.3 -.3 .3 .3 -.3 .3 -.3 .3 .3 .3 .3 .3"/></asset><worldbody><geom rgba="1 0 0 1" )" +
                    shape + "/><geom rgba='0 0 1 1' " + shape + "/></worldbody>");
@@ -228,7 +228,7 @@ TEST(Surface, HigherIdWinsIfSurfacesCoincide) {
 
 // A geom's own colour, unless it is the default, takes precedence over its material's.
 TEST(Surface, OwnColourOverridesTheMaterials) {
-  TestRenderer s(std::string(kFlat) +
+  TestRenderer s(std::string(kAmbient) +
                  R"(<asset><material name="m" rgba="0 0 1 1"/></asset><worldbody>
     <geom type="box" size=".1 .1 .1" pos="-1 0 0" material="m"/><geom type="box" size=".1 .1 .1" pos="0 0 0" material="m" rgba="1 0 0 1"/>
     <geom type="box" size=".1 .1 .1" pos="1 0 0" rgba="0 1 0 1"/></worldbody>)");
@@ -239,7 +239,8 @@ TEST(Surface, OwnColourOverridesTheMaterials) {
 
 // From below a plane is drawn as a veil of alpha 0.3, blended twice: its weight is 1 - 0.7^2.
 TEST(Surface, PlaneFromBelowIsTranslucent) {
-  TestRenderer s(std::string(kFlat) + R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 1 1 1"/>
+  TestRenderer s(std::string(kAmbient) +
+                 R"(<worldbody><geom type="plane" size="5 5 1" rgba="1 1 1 1"/>
     <geom size=".5" pos="2 0 2" rgba="0 0 1 1"/></worldbody>)");
   const int veil = static_cast<int>(std::lround(255 * (1 - 0.7 * 0.7)));
   const auto up = [&](double x) { return s.center({x, 0, -2}, {1, 0, 0}, {0, -1, 0}, 1); };
@@ -250,7 +251,7 @@ TEST(Surface, PlaneFromBelowIsTranslucent) {
 // Only the top of a box reflects, not its sides.
 TEST(Surface, OnlyTheTopOfABoxReflects) {
   TestRenderer s(
-      std::string(kFlat) +
+      std::string(kAmbient) +
       R"(<asset><material name="mirror" rgba="0 0 .2 1" reflectance=".5"/></asset><worldbody>
     <geom type="box" size="1 1 .5" pos="0 0 -.5" material="mirror"/>
     <geom type="box" size="9 .1 9" pos="0 3 0" rgba="1 0 0 1"/><geom type="box" size="9 .1 9" pos="0 -30 0" rgba="0 1 0 1"/>
@@ -290,7 +291,7 @@ TEST(Surface, AMirrorShowsTheFrontsOfAMesh) {
 // As in OpenGL, multisampling changes edges only, also in a mirror: its texture is not averaged.
 TEST(Surface, MultisamplingChangesOnlyTheEdgesInAMirror) {
   TestRenderer s(
-      std::string(kFlat) +
+      std::string(kAmbient) +
       R"(<asset><texture name="t" type="2d" builtin="checker" rgb1="0 0 0" rgb2="0 1 0" width="64" height="64"/>
     <material name="mirror" texture="t" texrepeat="40 40" reflectance=".5"/></asset><worldbody>
     <geom type="plane" size="5 5 1" material="mirror"/>
@@ -329,7 +330,7 @@ TEST(Surface, MultisamplingChangesOnlyTheEdgesInAMirror) {
 
 // The four rays of a pixel have four different heights, so an edge along the rows is softened too.
 TEST(Surface, SamplesSoftenEdgesInBothDirections) {
-  TestRenderer s(std::string(kFlat) +
+  TestRenderer s(std::string(kAmbient) +
                  R"(<worldbody><geom type="box" size=".5 .5 .5" rgba="1 1 1 1"/></worldbody>)");
   // 8 pixels over 2 m, orthographic, from 10 m above: pixels of 0.25 m, the box's edge at 0.5 m.
   // After a shift by a quarter of a pixel, the pixels along the edge are covered by a quarter.
@@ -353,7 +354,7 @@ TEST(Window, GeomReachingBehindTheCameraIsFullyVisible) {
   for (const char* shape :
        {"type='box' size='.1 20 .1'", "type='capsule' size='.1 20' euler='90 0 0'",
         "type='mesh' mesh='beam'"}) {
-    TestRenderer s(std::string(kFlat) +
+    TestRenderer s(std::string(kAmbient) +
                    R"(<asset><mesh name="beam" vertex="-.1 -20 -.1 .1 -20 -.1 -.1 20 -.1 .1 20 -.1
       -.1 -20 .1 .1 -20 .1 -.1 20 .1 .1 20 .1"/></asset><worldbody><geom pos=".5 0 0" rgba="1 1 1 1" )" +
                    shape + "/></worldbody>");
@@ -370,7 +371,7 @@ TEST(Window, GeomReachingBehindTheCameraIsFullyVisible) {
 TEST(Window, OrthographicSizeIsIndependentOfDistance) {
   for (const double distance : {2.0, 8.0, 200.0}) {
     TestRenderer s(
-        std::string(kFlat) +
+        std::string(kAmbient) +
         R"(<worldbody><geom type="box" size=".3 .2 .1" pos=".5 .4 0" rgba="1 1 1 1"/></worldbody>)");
     const Picture p =
         s.take({0, 0, distance}, {1, 0, 0}, {0, 1, 0}, grid_from_fovy(40, 40, 2, true));

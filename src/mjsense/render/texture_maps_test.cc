@@ -16,9 +16,9 @@ namespace mjsense::render {
 namespace {
 
 using testing::kDark;
+using testing::kX;
+using testing::kY;
 using testing::TestRenderer;
-
-constexpr std::array<double, 3> kX{1, 0, 0}, kY{0, 1, 0};
 
 std::string flat(const std::string& rgb, const std::string& more = R"(type="2d" height="4")") {
   return R"(<texture name="t" builtin="flat" width="4" rgb1=")" + rgb + "\" rgb2=\"" + rgb + "\" " +

@@ -95,8 +95,8 @@ TEST(CompiledModel, OtherAdditionsAreRefusedWithTheirXml) {
                   mjs_setName(mjs_addSite(mjs_findBody(spec, "b"), nullptr)->element, "mark");
                 });
               }),
-              testing::StartsWith("the model has no site 'mark', which a sensor "
-                                  "needs: add <site name=\"mark\""));
+              ::testing::StartsWith("the model has no site 'mark', which a sensor "
+                                    "needs: add <site name=\"mark\""));
 }
 
 TEST(CompiledModel, UnnamedElementsGetTheNamesOfABase) {

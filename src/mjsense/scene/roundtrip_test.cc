@@ -123,7 +123,7 @@ TEST(RoundTrip, PlainEntities) {
   expect_round_trip(Scene(std::move(cfg)));
 }
 
-constexpr const char* kObj =
+constexpr const char* kSavedObj =
     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 constexpr const char* kMeshXml =
     "<mujoco><compiler meshdir='meshes'/><asset><mesh name='tet' file='tet.obj' scale='.1 .1 "
@@ -136,7 +136,7 @@ TEST(RoundTrip, FilesOnDisk) {
   const testing::TempDir temporary;
   const auto& dir = temporary.path;
   std::filesystem::create_directories(dir / "meshes");
-  std::ofstream(dir / "meshes" / "tet.obj") << kObj;
+  std::ofstream(dir / "meshes" / "tet.obj") << kSavedObj;
   std::ofstream(dir / "robot.xml") << kMeshXml;
   SceneCfg cfg;
   cfg.entities = {{"a", {.model = {.path = (dir / "robot.xml").string()}}},
@@ -146,8 +146,8 @@ TEST(RoundTrip, FilesOnDisk) {
 
 TEST(RoundTrip, FilesInMemory) {
   SceneCfg cfg;
-  cfg.entities = {{"a", {.model = {.xml = kMeshXml, .assets = {{"meshes/tet.obj", kObj}}}}},
-                  {"b", {.model = {.xml = kMeshXml, .assets = {{"meshes/tet.obj", kObj}}}}}};
+  cfg.entities = {{"a", {.model = {.xml = kMeshXml, .assets = {{"meshes/tet.obj", kSavedObj}}}}},
+                  {"b", {.model = {.xml = kMeshXml, .assets = {{"meshes/tet.obj", kSavedObj}}}}}};
   expect_round_trip(Scene(std::move(cfg)));
 }
 
@@ -204,7 +204,7 @@ TEST(RoundTrip, ClashingFiles) {
   const std::string big =
       "v 0 0 0\nv 2 0 0\nv 0 2 0\nv 0 0 2\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
   SceneCfg cfg;
-  cfg.entities = {{"a", {.model = {.xml = kMeshXml, .assets = {{"tet.obj", kObj}}}}},
+  cfg.entities = {{"a", {.model = {.xml = kMeshXml, .assets = {{"tet.obj", kSavedObj}}}}},
                   {"b", {.model = {.xml = kMeshXml, .assets = {{"tet.obj", big}}}}},
                   {"c", {.model = {.xml = kMeshXml, .assets = {{"tet.obj", big}}}}}};
   Scene scene(std::move(cfg));

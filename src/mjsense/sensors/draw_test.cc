@@ -17,6 +17,7 @@
 #include "mjsense/sensors/lidar/lidar_sensor.h"
 #include "mjsense/sensors/raycast/raycast_sensor.h"
 #include "mjsense/sensors/testing/every_sensor.h"
+#include "mjsense/sensors/testing/lab.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense::sensors {
@@ -39,22 +40,17 @@ constexpr char kWorld[] = R"(
   </worldbody>
 </mujoco>)";
 
-struct Lab {
-  std::shared_ptr<scene::Scene> scene;
-  std::unique_ptr<sim::Simulation> sim;
+struct DrawnScene : testing::Lab {
+  explicit DrawnScene(std::vector<std::shared_ptr<const SensorCfg>> sensors, int worlds = 1)
+      : Lab(scene_with(std::move(sensors)), {.num_worlds = worlds}) {}
 
-  explicit Lab(std::vector<std::shared_ptr<const SensorCfg>> sensors, int worlds = 1) {
-    scene::SceneCfg s;
-    scene::EntityCfg e;
-    e.model.xml = kWorld;
-    s.entities.emplace_back("w", e);
+  static scene::SceneCfg scene_with(std::vector<std::shared_ptr<const SensorCfg>> sensors) {
+    scene::SceneCfg s = scene_of("w", kWorld, std::move(sensors));
     s.spec_fn = [](mjSpec* spec) {
       spec->stat.meansize = 0.1;
       spec->visual.map.force = 0.01;
     };
-    s.sensors = std::move(sensors);
-    scene = std::make_shared<scene::Scene>(std::move(s));
-    sim = std::make_unique<sim::Simulation>(scene, sim::SimulationCfg{.num_worlds = worlds});
+    return s;
   }
   DebugShapes draw(std::string_view name, int world = 0) {
     Sensor* sensor[] = {&scene->sensor(name)};
@@ -95,7 +91,7 @@ std::vector<DebugShape> lines(const DebugShapes& shapes) {
 TEST(Draw, FrustumReachesFromTheCameraToFar) {
   auto cfg = top_camera();
   cfg->far = 0.5;
-  Lab lab({cfg});
+  DrawnScene lab({cfg});
   const DebugShapes shapes = lab.sim->draw(0);
   ASSERT_EQ(shapes.list().size(), 3u + 8u);
   EXPECT_EQ(shapes.list()[0].label, "cam_x");
@@ -118,7 +114,7 @@ TEST(Draw, FrustumHasTheGivenDepthAndTheNearPlane) {
   cfg->near = 0.1;
   cfg->viz.show_frame = false;
   cfg->viz.frustum_depth = 1;
-  Lab lab({cfg});
+  DrawnScene lab({cfg});
   const auto l = lines(lab.sim->draw(0));
   ASSERT_EQ(l.size(), 12u);
   expect_at(l[0].pos, -2, 1, 1);
@@ -131,7 +127,7 @@ TEST(Draw, OrthographicFrustumIsABox) {
   auto cfg = top_camera();
   cfg->orthographic = true;
   cfg->fovy = 1.0;
-  Lab lab({cfg});
+  DrawnScene lab({cfg});
   const auto l = lines(lab.draw("cam"));
   ASSERT_EQ(l.size(), 12u);
   expect_at(l[0].pos, -1, 0.5, 1);  // 10 meansize below the camera
@@ -143,7 +139,7 @@ TEST(Draw, FrustumOfALensIsBentWithItsRimAtOneDistance) {
   auto cfg = top_camera();
   cfg->intrinsics = CameraIntrinsics{15, 15, 20, 10};
   cfg->distortion = {"fisheye", {0, 0, 0, 0}};
-  Lab lab({cfg});
+  DrawnScene lab({cfg});
   const auto l = lines(lab.draw("cam"));
   ASSERT_EQ(l.size(), 4u * 8 + 4);
   for (const DebugShape& s : l) EXPECT_NEAR(norm(s.pos + s.vector - Vec3{0, 0, 2}), 1, 1e-5);
@@ -155,7 +151,7 @@ TEST(Draw, FrustumIsAtThePoseOfTheImage) {
   auto moving = sensor<CameraSensorCfg>("cam");
   moving->parent_body = "w/box";
   moving->update_period = 0.1;
-  Lab lab({moving});
+  DrawnScene lab({moving});
   lab.sim->refresh(lab.scene->sensor("cam"));
   const ArrayView v = lab.sim->worlds().state_component("qpos");
   reinterpret_cast<double*>(v.data)[0] = 3;
@@ -169,7 +165,7 @@ TEST(Draw, ContactsInTheSlotsAndTheirForces) {
   cfg->fields = {"found"};  // the drawing does not depend on the fields
   cfg->num_slots = 3;
   cfg->debug_vis = true;
-  Lab lab({cfg}, 2);
+  DrawnScene lab({cfg}, 2);
   for (int i = 0; i < 1000; ++i) lab.sim->step();
   const DebugShapes shapes = lab.sim->draw(1);
   ASSERT_EQ(shapes.list().size(), 3u * (1 + 3 + 1));
@@ -199,7 +195,7 @@ TEST(Draw, NetForceIsOneArrowWithItsOwnScale) {
   cfg->reduce = "netforce";
   cfg->viz.force_scale = 0.1;
   cfg->viz.show_points = false;
-  Lab lab({cfg});
+  DrawnScene lab({cfg});
   for (int i = 0; i < 1000; ++i) lab.sim->step();
   const DebugShapes shapes = lab.draw("touch");
   ASSERT_EQ(shapes.list().size(), 1u);
@@ -216,7 +212,7 @@ TEST(Draw, BuiltinSensorIsDrawnAsItsFrame) {
   joint->obj = {"joint", "hinge", "w"};
   auto imu = sensor<ImuSensorCfg>("imu");
   imu->site = site->obj;
-  Lab lab({site, joint, imu});
+  DrawnScene lab({site, joint, imu});
   for (const char* name : {"w/gyro", "imu"}) {
     const DebugShapes shapes = lab.draw(name);
     ASSERT_EQ(shapes.list().size(), 3u) << name;
@@ -232,7 +228,7 @@ TEST(Draw, BuiltinSensorIsDrawnAsItsFrame) {
 
 TEST(Draw, DrawingComputesOneWorldAndIsNotARead) {
   auto cfg = top_camera();
-  Lab lab({cfg}, 2);
+  DrawnScene lab({cfg}, 2);
   (void)lab.sim->draw(1);
   const Array& pose = lab.scene->sensor("cam").field("pose").data;
   EXPECT_EQ(pose.row<float>(0)[15], 0);

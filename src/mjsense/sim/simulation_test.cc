@@ -402,7 +402,7 @@ struct Throwing : Sensor {
 TEST(Simulation, AnyExceptionOfASensorReachesTheCaller) {
   for (const char* in : {"compute", "substep", "reset", "cast"}) {
     for (const bool memory : {true, false}) {
-      SCOPED_TRACE(testing::Message() << in << (memory ? " bad_alloc" : " int"));
+      SCOPED_TRACE(::testing::Message() << in << (memory ? " bad_alloc" : " int"));
       const SimulationCfg cfg{.num_worlds = 3, .decimation = 2, .threads = 2};
       Simulation sim(scene(), cfg), plain(scene(), cfg);
       auto bad =
@@ -435,7 +435,7 @@ TEST(Simulation, AnyExceptionOfASensorReachesTheCaller) {
       sim.refresh(*good);
       const ArrayView a = sim.worlds().state(), b = plain.worlds().state();
       EXPECT_EQ(std::memcmp(a.data, b.data, 3 * a.strides[0]), 0);
-      EXPECT_THAT(good->computes, Each(testing::Ge(1)));
+      EXPECT_THAT(good->computes, Each(::testing::Ge(1)));
     }
   }
 }

@@ -12,8 +12,8 @@
 namespace mjsense::tasks::episode {
 namespace {
 
-using testing::AllOf;
-using testing::HasSubstr;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 
 // Two free bodies, a drawer and a fixed shelf.
 constexpr const char* kScene = R"(
@@ -40,9 +40,9 @@ TEST(GivenStart, WritesPosesAndJointsAtRest) {
   check_names(model.get(), starts, "test");
   write_start(model.get(), start, robots::state_row(data.get()));
   EXPECT_THAT(std::vector<double>(data->qpos, data->qpos + 7),
-              testing::ElementsAre(0.1, 0.2, 0.3, 0, 1, 0, 0));
+              ::testing::ElementsAre(0.1, 0.2, 0.3, 0, 1, 0, 0));
   EXPECT_EQ(data->qpos[model->nq - 1], 0.25);
-  EXPECT_THAT(std::vector<double>(data->qvel, data->qvel + 6), testing::Each(0.0));
+  EXPECT_THAT(std::vector<double>(data->qvel, data->qvel + 6), ::testing::Each(0.0));
   EXPECT_EQ(data->qvel[6], 1) << "other bodies are not changed";
   EXPECT_EQ(start.thresholds.at("lift"), 0.5);
 }
@@ -57,7 +57,7 @@ TEST(GivenStart, NamesThatAreNotThereAreOneError) {
       error_of<ValueError>([&] { check_names(model.get(), starts, "task 'pick'"); }),
       AllOf(HasSubstr("task 'pick': given starts: the scene has no 'cup', 'push'; its free "
                       "bodies are 'mug/mug', 'left/cup', 'right/cup'"),
-            HasSubstr("'drawer', 'shelf' cannot be moved"), testing::Not(HasSubstr("plate"))));
+            HasSubstr("'drawer', 'shelf' cannot be moved"), ::testing::Not(HasSubstr("plate"))));
 }
 
 TEST(GivenStart, InvalidTextsThrow) {

@@ -28,7 +28,7 @@ constexpr char kScene[] = R"(
   </worldbody>
 </mujoco>)";
 
-struct Fingers : testing::Test {
+struct Fingers : ::testing::Test {
   Fingers() {
     gripper.pad_sites[0] = site("left_pad");
     gripper.pad_sites[1] = site("right_pad");

@@ -9,7 +9,7 @@ namespace mjsense::tasks::robots {
 namespace {
 
 // A gripper that is one sphere at (1, 0, .58), and a cube on the floor.
-constexpr char kScene[] = R"(
+constexpr char kGripper[] = R"(
 <mujoco>
   <worldbody>
     <geom name="floor" type="plane" size="2 2 .1"/>
@@ -21,7 +21,7 @@ constexpr char kScene[] = R"(
 </mujoco>)";
 
 TEST(GraspState, TouchingIsNotHolding) {
-  observe::TestWorld w(kScene);
+  observe::TestWorld w(kGripper);
   GraspStateSensor grasp("grasp_state_pickup_obj", "thing/cube", {{"gripper", "robot/base"}});
   const auto held = [&]() -> bool { return observe::values<bool>(grasp, "gripper/held")[0]; };
   const auto touching = [&]() -> bool {

@@ -15,7 +15,7 @@
 namespace mjsense::tasks::robots {
 namespace {
 
-struct Fr3 : testing::Test {
+struct Fr3 : ::testing::Test {
   void SetUp() override {
     const RobotCfg robot = robot_cfg("franka");
     const scene::SpecPtr spec(mj_copySpec(robot.model.spec));

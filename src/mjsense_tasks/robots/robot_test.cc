@@ -13,10 +13,10 @@
 namespace mjsense::tasks::robots {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 // A Franka without other objects, in two worlds.
-struct Franka : testing::Test {
+struct Franka : ::testing::Test {
   static scene::SceneCfg scene_cfg() {
     scene::SceneCfg cfg;
     scene::EntityCfg entity;

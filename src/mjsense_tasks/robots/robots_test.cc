@@ -15,7 +15,7 @@
 namespace mjsense::tasks::robots {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 struct Alone : LoneRobot {
   explicit Alone(const std::string& name, const std::optional<ControllerCfg>& of_arms = {})
@@ -67,7 +67,7 @@ void randomize(const Robot& robot, const mjModel* m, mjData* d, Rng& rng) {
   }
 }
 
-struct EveryRobot : testing::TestWithParam<std::string> {
+struct EveryRobot : ::testing::TestWithParam<std::string> {
   Alone alone{GetParam()};
 };
 
@@ -332,13 +332,13 @@ TEST_P(EveryRobot, AMobileBaseReachesItsTarget) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Robots, EveryRobot, testing::ValuesIn(robot_names()),
+INSTANTIATE_TEST_SUITE_P(Robots, EveryRobot, ::testing::ValuesIn(robot_names()),
                          [](const auto& info) { return info.param; });
 
 TEST(Robots, HaveTheseNames) {
   EXPECT_THAT(robot_names(),
-              testing::ElementsAre("bimanual_yam", "floating_rum", "franka", "franka_hand",
-                                   "i2rt_yam", "mobile_franka", "rby1"));
+              ::testing::ElementsAre("bimanual_yam", "floating_rum", "franka", "franka_hand",
+                                     "i2rt_yam", "mobile_franka", "rby1"));
 }
 
 // The groups, their order and their numbers of qpos and command values are those of MolmoSpaces.

@@ -11,8 +11,8 @@
 namespace mjsense::tasks::robots {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 // Two hinges with a motor each, two slides driven by one tendon, and one joint without actuator.
 constexpr const char* kArm = R"(
@@ -33,7 +33,7 @@ constexpr const char* kArm = R"(
   </actuator>
 </mujoco>)";
 
-struct SceneRobot : testing::Test {
+struct SceneRobot : ::testing::Test {
   static scene::SceneCfg scene_cfg() {
     scene::EntityCfg arm;
     arm.model.xml = kArm;

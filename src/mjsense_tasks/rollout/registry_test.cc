@@ -10,7 +10,7 @@
 namespace mjsense::tasks::rollout {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 template <class Make>
 void expect_unknown(Make&& make, const char* nearest) {

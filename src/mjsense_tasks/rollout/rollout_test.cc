@@ -20,10 +20,10 @@ namespace mjsense::tasks::rollout {
 namespace {
 
 using nlohmann::json;
-using testing::ElementsAre;
-using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::Not;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
 
 RolloutCfg blind(int num_worlds = 1, int threads = 1) {
   RolloutCfg cfg;

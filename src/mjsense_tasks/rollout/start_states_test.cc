@@ -12,7 +12,7 @@
 namespace mjsense::tasks::rollout {
 namespace {
 
-using testing::StartsWith;
+using ::testing::StartsWith;
 
 constexpr int kWorlds = 8;
 

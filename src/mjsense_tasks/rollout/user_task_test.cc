@@ -14,8 +14,8 @@
 namespace mjsense::tasks::rollout {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 constexpr const char* kCart = R"(
 <mujoco>
@@ -121,7 +121,7 @@ RolloutCfg two_worlds() {
   return cfg;
 }
 
-struct OwnTask : testing::Test {
+struct OwnTask : ::testing::Test {
   std::shared_ptr<CartTask> task = std::make_shared<CartTask>(episode::TaskCfg{});
   std::shared_ptr<Drive> policy = std::make_shared<Drive>();
 
@@ -196,8 +196,8 @@ TEST_F(OwnTask, RegisteredTaskHasAName) {
   register_task("cart",
                 [](episode::TaskCfg cfg) { return std::make_unique<CartTask>(std::move(cfg)); });
   register_policy("drive", [] { return std::make_unique<Drive>(); });
-  EXPECT_THAT(task_names(), testing::Contains("cart"));
-  EXPECT_THAT(policy_names(), testing::Contains("drive"));
+  EXPECT_THAT(task_names(), ::testing::Contains("cart"));
+  EXPECT_THAT(policy_names(), ::testing::Contains("drive"));
   RolloutCfg cfg = two_worlds();
   cfg.task = "cart";
   cfg.policy = "drive";

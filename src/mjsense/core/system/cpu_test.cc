@@ -28,7 +28,7 @@ TEST(Cpu, TheEnvironmentLowersTheInstructionSet) {
   for (const auto& [wanted, printed] :
        {std::pair{"portable", "^portable$"}, {"sse", "expected portable, avx2 or avx512"}}) {
     setenv("MJSENSE_ISA", wanted, 1);
-    EXPECT_EXIT(print_isa(), testing::ExitedWithCode(0), printed);
+    EXPECT_EXIT(print_isa(), ::testing::ExitedWithCode(0), printed);
   }
   setenv("MJSENSE_ISA", restored.c_str(), 1);
 }

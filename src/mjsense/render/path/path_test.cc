@@ -13,9 +13,9 @@ namespace mjsense::render {
 namespace {
 
 using testing::kDark;
+using testing::kX;
+using testing::kY;
 using testing::TestRenderer;
-
-constexpr std::array<double, 3> kX{1, 0, 0}, kY{0, 1, 0};
 
 PhysicalOptions surrounded_by(double radiance) {
   PhysicalOptions out;

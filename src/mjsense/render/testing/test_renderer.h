@@ -147,8 +147,11 @@ inline void expect_pixel(Pixel got, Pixel want, int tolerance = 1) {
                                             << want[0] << " " << want[1] << " " << want[2];
 }
 
+// Axes of a camera that looks down.
+inline constexpr std::array<double, 3> kX{1, 0, 0}, kY{0, 1, 0};
+
 // Ambient light only: a pixel shows colour times texture.
-inline constexpr char kFlat[] =
+inline constexpr char kAmbient[] =
     R"(<visual><headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>)";
 inline constexpr char kDark[] = R"(<visual><headlight active="0"/></visual>)";
 inline constexpr char kMatte[] =

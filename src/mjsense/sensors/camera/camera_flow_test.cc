@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "mjsense/core/error.h"
-#include "mjsense/scene/scene.h"
 #include "mjsense/sensors/camera/camera_sensor_cfg.h"
+#include "mjsense/sensors/testing/lab.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense::sensors {
@@ -49,30 +49,18 @@ std::shared_ptr<CameraSensorCfg> flow_camera(std::vector<std::string> types = {"
   return cfg;
 }
 
-struct Lab {
-  std::shared_ptr<scene::Scene> scene;
-  std::unique_ptr<sim::Simulation> sim;
+struct FlowLab : testing::Lab {
+  explicit FlowLab(std::shared_ptr<CameraSensorCfg> camera, sim::SimulationCfg cfg = {})
+      : Lab(scene_with(std::move(camera)), cfg) {}
 
-  explicit Lab(std::shared_ptr<CameraSensorCfg> camera, sim::SimulationCfg cfg = {}) {
-    scene::SceneCfg s;
-    scene::EntityCfg e;
-    e.model.xml = kWorld;
-    s.entities.emplace_back("w", e);
+  static scene::SceneCfg scene_with(std::shared_ptr<CameraSensorCfg> camera) {
+    scene::SceneCfg s = scene_of("w", kWorld, {std::move(camera)});
     s.options.gravity = {0, 0, 0};
-    s.sensors = {std::move(camera)};
-    scene = std::make_shared<scene::Scene>(std::move(s));
-    sim = std::make_unique<sim::Simulation>(scene, cfg);
-  }
-  double* qpos(int world = 0) {
-    const ArrayView v = sim->worlds().state_component("qpos");
-    return reinterpret_cast<double*>(v.data + world * v.strides[0]);
+    return s;
   }
   template <class T = float>
   std::vector<T> read(std::string_view field = "flow", int world = 0) {
-    Sensor& sensor = scene->sensor("cam");
-    sim->refresh(sensor);
-    const auto row = sensor.field(field).data.row<T>(world);
-    return {row.begin(), row.end()};
+    return Lab::read<T>(field, "cam", world);
   }
   void turn(double angle, double x, double y, double z) {
     const double s = std::sin(angle / 2), n = std::sqrt(x * x + y * y + z * z);
@@ -91,7 +79,7 @@ void for_pixels(const std::vector<float>& flow, Check&& check) {
 }
 
 TEST(Flow, IsZeroInTheFirstImageAndWhileNothingMoves) {
-  Lab lab(flow_camera());
+  FlowLab lab(flow_camera());
   for (float f : lab.read()) EXPECT_EQ(f, 0);
   lab.sim->step();
   for (float f : lab.read()) EXPECT_EQ(f, 0);
@@ -101,7 +89,7 @@ TEST(Flow, IsZeroInTheFirstImageAndWhileNothingMoves) {
 //    o     o        |
 //    \ dx /         |  z
 TEST(Flow, OfATranslatingCameraIsFocalTimesDistanceOverDepth) {
-  Lab lab(flow_camera());
+  FlowLab lab(flow_camera());
   lab.read();
   lab.qpos()[kX] = 0.1;
   lab.qpos()[kY] = -0.04;
@@ -119,7 +107,7 @@ TEST(Flow, OfATranslatingCameraIsFocalTimesDistanceOverDepth) {
 }
 
 TEST(Flow, OfAMovingObjectFollowsItsMotion) {
-  Lab lab(flow_camera());
+  FlowLab lab(flow_camera());
   lab.read();
   lab.qpos()[kPlate] = 0.05;
   lab.sim->forward();
@@ -134,7 +122,7 @@ TEST(Flow, OfAMovingObjectFollowsItsMotion) {
 }
 
 TEST(Flow, IncludesTeleports) {
-  Lab lab(flow_camera());
+  FlowLab lab(flow_camera());
   lab.sim->step();
   lab.read();
   lab.sim->step();
@@ -149,7 +137,7 @@ TEST(Flow, IncludesTeleports) {
 // world, moved back by the plate's motion, and projected into the previous image by the formulas of
 // CameraSensorCfg.
 void expect_flow_of_point_cloud(const std::shared_ptr<CameraSensorCfg>& cfg, double focal) {
-  Lab lab(cfg);
+  FlowLab lab(cfg);
   lab.qpos()[kX] = 0.2;
   lab.turn(0.1, 1, -1, 2);
   lab.sim->forward();
@@ -228,7 +216,7 @@ TEST(Flow, AgreesWithThePointCloudInEveryKindOfCamera) {
 }
 
 TEST(Flow, IsNanWhereNothingIsSeenOrWasBehindTheCamera) {
-  Lab lab(flow_camera());
+  FlowLab lab(flow_camera());
   lab.qpos()[kZ] = -1.5;  // 0.5 m above the wall, below the plate's top at 1 m
   lab.sim->forward();
   lab.read();
@@ -243,7 +231,7 @@ TEST(Flow, IsNanWhereNothingIsSeenOrWasBehindTheCamera) {
 }
 
 TEST(Flow, PartialResetClearsThePreviousImageOfItsWorlds) {
-  Lab lab(flow_camera(), {.num_worlds = 2});
+  FlowLab lab(flow_camera(), {.num_worlds = 2});
   lab.read();
   const auto move = [&](double x) {
     lab.qpos(0)[kX] = lab.qpos(1)[kX] = x;
@@ -262,7 +250,7 @@ TEST(Flow, PartialResetClearsThePreviousImageOfItsWorlds) {
 }
 
 TEST(Flow, ImageAtTheSameTimeReplacesTheLast) {
-  Lab lab(flow_camera());
+  FlowLab lab(flow_camera());
   lab.sim->step();
   lab.read();
   lab.qpos()[kX] = 0.1;
@@ -278,7 +266,7 @@ TEST(Flow, ImageAtTheSameTimeReplacesTheLast) {
 TEST(Flow, IsBetweenImagesOfTheCamerasOwnRate) {
   auto cfg = flow_camera();
   cfg->update_period = 0.006;  // three steps
-  Lab lab(cfg);
+  FlowLab lab(cfg);
   lab.qpos()[kX] = 5;  // after the reset, this is still the first image
   lab.sim->forward();
   for (float f : lab.read()) EXPECT_EQ(f, 0);
@@ -295,7 +283,7 @@ TEST(Flow, UsesTrueDepth) {
   noisy->depth_noise = "d435";
   std::vector<float> flows[2], depths[2];
   for (int i = 0; i < 2; ++i) {
-    Lab lab(i == 0 ? plain : noisy);
+    FlowLab lab(i == 0 ? plain : noisy);
     lab.read();
     lab.qpos()[kX] = 0.1;
     lab.sim->forward();
@@ -310,7 +298,7 @@ TEST(Flow, IsTheSameWithMuJoCosRenderer) {
   auto cfg = flow_camera();
   cfg->renderer = "opengl";
   try {
-    Lab lab(cfg);
+    FlowLab lab(cfg);
     lab.read();
     lab.qpos()[kX] = 0.1;
     lab.sim->forward();

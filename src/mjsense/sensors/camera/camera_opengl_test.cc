@@ -14,7 +14,7 @@
 namespace mjsense::sensors {
 namespace {
 
-constexpr char kScene[] = R"(<mujoco>
+constexpr char kGlScene[] = R"(<mujoco>
   <asset><texture name="sky" type="skybox" builtin="gradient" rgb1=".4 .6 .8" rgb2="0 0 0" width="64" height="64"/>
     <texture name="t" type="2d" builtin="checker" rgb1=".8 .2 .2" rgb2=".2 .2 .8" width="64" height="64"/>
     <texture name="q" type="cube" builtin="gradient" rgb1="1 1 0" rgb2="0 1 1" width="16" height="16"/>
@@ -52,7 +52,7 @@ constexpr char kSoftScene[] = R"(<mujoco>
 
 class CameraAgainstOpenGL : public ::testing::TestWithParam<const char*> {};
 
-INSTANTIATE_TEST_SUITE_P(Scenes, CameraAgainstOpenGL, ::testing::Values(kScene, kSoftScene),
+INSTANTIATE_TEST_SUITE_P(Scenes, CameraAgainstOpenGL, ::testing::Values(kGlScene, kSoftScene),
                          [](const auto& scene) { return scene.index == 0 ? "rigid" : "soft"; });
 
 TEST_P(CameraAgainstOpenGL, DepthIdsAndColoursAgree) {

@@ -16,6 +16,7 @@
 #include "mjsense/core/testing/allocations.h"
 #include "mjsense/rays/ray_scene.h"
 #include "mjsense/scene/scene.h"
+#include "mjsense/sensors/testing/lab.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense::sensors {
@@ -24,35 +25,15 @@ namespace {
 using ::testing::HasSubstr;
 
 // A scene with one entity "w" and cameras.
-struct Lab {
-  std::shared_ptr<scene::Scene> scene;
-  std::unique_ptr<sim::Simulation> sim;
+struct CameraLab : testing::Lab {
+  using Lab::Lab;
+  CameraLab(const std::string& worldbody, std::vector<CameraSensorCfg> cameras,
+            sim::SimulationCfg cfg = {})
+      : Lab("w", "<mujoco>" + worldbody + "</mujoco>", shared(std::move(cameras)), cfg) {}
 
-  Lab(const std::string& worldbody, std::vector<CameraSensorCfg> cameras,
-      sim::SimulationCfg cfg = {}) {
-    scene::SceneCfg s;
-    scene::EntityCfg e;
-    e.model.xml = "<mujoco>" + worldbody + "</mujoco>";
-    s.entities.emplace_back("w", e);
-    for (CameraSensorCfg& c : cameras) s.sensors.push_back(std::make_shared<CameraSensorCfg>(c));
-    scene = std::make_shared<scene::Scene>(std::move(s));
-    sim = std::make_unique<sim::Simulation>(scene, cfg);
-  }
-  Lab(scene::SceneCfg s, sim::SimulationCfg cfg)
-      : scene(std::make_shared<scene::Scene>(std::move(s))),
-        sim(std::make_unique<sim::Simulation>(scene, cfg)) {}
   template <class T>
   std::vector<T> read(std::string_view field, std::string_view name = "cam", int world = -1) {
-    Sensor& sensor = scene->sensor(name);
-    sim->refresh(sensor);
-    const Array& data = sensor.field(field).data;
-    const auto all = world < 0 ? data.all<T>() : data.row<T>(world);
-    return {all.begin(), all.end()};
-  }
-  void pose(int world, std::initializer_list<double> qpos) {
-    const ArrayView v = sim->worlds().state_component("qpos");
-    std::copy(qpos.begin(), qpos.end(), reinterpret_cast<double*>(v.data + world * v.strides[0]));
-    sim->forward(std::vector<int>{world});
+    return Lab::read<T>(field, name, world);
   }
 };
 
@@ -78,7 +59,7 @@ constexpr char kCases[] = R"(<worldbody><light pos="0 0 3" dir="0 0 -1"/>
           focal=".006 .006" principal=".0005 -.0003"/></worldbody>)";
 
 TEST(Camera, DepthIsPlanarAndIdsAreGeoms) {
-  Lab lab(kCases, {camera(8, 6, {"depth", "segmentation"}, "w/top")});
+  CameraLab lab(kCases, {camera(8, 6, {"depth", "segmentation"}, "w/top")});
   const auto depth = lab.read<float>("depth");
   const auto ids = lab.read<std::int32_t>("segmentation");
   ASSERT_EQ(depth.size(), 48u);
@@ -110,9 +91,9 @@ TEST(Camera, PixelsHaveBodyAndEntityIds) {
   entities.name = "entities";
   for (const CameraSensorCfg& c : {all, entities})
     cfg.sensors.push_back(std::make_shared<CameraSensorCfg>(c));
-  Lab lab(std::move(cfg), {.num_worlds = 2, .threads = 2});
+  CameraLab lab(std::move(cfg), {.num_worlds = 2, .threads = 2});
   for (int world : {0, 1})
-    lab.pose(world, {-1, 0, 1, 1, 0, 0, 0, 1 + 20.0 * world, 0, 1, 1, 0, 0, 0});
+    lab.pose({-1, 0, 1, 1, 0, 0, 0, 1 + 20.0 * world, 0, 1, 1, 0, 0, 0}, world);
   const mjModel* m = lab.scene->model();
   int seen[3] = {};
   for (int world : {0, 1}) {
@@ -144,7 +125,7 @@ TEST(Camera, PixelsOfAFlexHaveItsEntityId) {
   CameraSensorCfg all = camera(32, 16, {"segmentation", "entity_segmentation"});
   all.pos = {0, 0, 5};
   cfg.sensors.push_back(std::make_shared<CameraSensorCfg>(all));
-  Lab lab(std::move(cfg), {});
+  CameraLab lab(std::move(cfg), {});
   const auto ids = lab.read<std::int32_t>("segmentation");
   const auto owners = lab.read<std::int32_t>("entity_segmentation");
   int seen[2] = {};
@@ -162,7 +143,7 @@ TEST(Camera, OneCameraServesSensorsWithDifferentGroups) {
   without_ball.enabled_geom_groups = {0};
   with_hidden.name = "all";
   with_hidden.enabled_geom_groups = {0, 1, 2, 3};
-  Lab lab(kCases, {without_ball, with_hidden});
+  CameraLab lab(kCases, {without_ball, with_hidden});
   const auto few = lab.read<std::int32_t>("segmentation");
   const auto all = lab.read<std::int32_t>("segmentation", "all");
   EXPECT_EQ(few[2 * (8 * 1 + 6)], 0);
@@ -174,7 +155,7 @@ TEST(Camera, OneCameraServesSensorsWithDifferentGroups) {
 TEST(Camera, SphereAtTwoMetresReadsTwoMetres) {
   CameraSensorCfg cfg = camera(31, 31, {"depth", "normals", "point_cloud"});
   cfg.pos = {0, 0, 2.5};
-  Lab lab(R"(<worldbody><geom size=".5"/></worldbody>)", {cfg});
+  CameraLab lab(R"(<worldbody><geom size=".5"/></worldbody>)", {cfg});
   const int center = 15 * 31 + 15;
   EXPECT_NEAR(lab.read<float>("depth")[center], 2.0, 1e-6);
   const auto n = lab.read<float>("normals");
@@ -194,7 +175,7 @@ TEST(Camera, SphereAtTwoMetresReadsTwoMetres) {
 }
 
 TEST(Camera, KnownPointsProjectToTheRightPixels) {
-  Lab lab(kCases, {camera(64, 48, {"segmentation"}, "w/phys")});
+  CameraLab lab(kCases, {camera(64, 48, {"segmentation"}, "w/phys")});
   const auto ids = lab.read<std::int32_t>("segmentation");
   const auto k = lab.read<float>("intrinsics");
   const auto pose = lab.read<float>("pose");
@@ -219,7 +200,7 @@ TEST(Camera, KnownPointsProjectToTheRightPixels) {
 TEST(Camera, RayDepthIsThePointsDistance) {
   CameraSensorCfg cfg = camera(16, 12, {"depth", "point_cloud"}, "w/top");
   cfg.depth_kind = "ray";
-  Lab lab(kCases, {cfg});
+  CameraLab lab(kCases, {cfg});
   const auto d = lab.read<float>("depth"), p = lab.read<float>("point_cloud");
   for (std::size_t i = 0; i < d.size(); ++i)
     EXPECT_NEAR(d[i], std::hypot(p[3 * i], p[3 * i + 1], p[3 * i + 2]), 1e-5);
@@ -230,7 +211,7 @@ TEST(Camera, OrthographicRaysAreParallel) {
   cfg.pos = {0.03, 0.02, 4.0};
   cfg.fovy = 3.0;  // m
   cfg.orthographic = true;
-  Lab lab(kCases, {cfg});
+  CameraLab lab(kCases, {cfg});
   const auto d = lab.read<float>("depth");
   const auto p = lab.read<float>("point_cloud");
   for (int y = 0; y < 4; ++y)
@@ -247,11 +228,11 @@ TEST(Camera, SeesWhatMuJoCoDraws) {
   // A geom with alpha 0 is invisible; a shell is transparent from inside; a plane is visible from
   // one side.
   CameraSensorCfg cfg = camera(3, 3, {"depth", "segmentation"}, "w/c");
-  Lab lab(R"(<worldbody><geom name="floor" type="plane" size="10 10 .1"/>
+  CameraLab lab(R"(<worldbody><geom name="floor" type="plane" size="10 10 .1"/>
     <geom name="ghost" size=".3" pos="0 0 1" rgba="1 1 1 0"/><geom name="shell" size=".5" pos="0 0 3"/>
     <camera name="c" pos=".02 .01 3" fovy="30"/><camera name="below" pos="0 0 -1" quat="0 1 0 0"/>
     </worldbody>)",
-          {cfg});
+                {cfg});
   for (float d : lab.read<float>("depth")) EXPECT_NEAR(d, 3.0, 1e-5);
   for (std::size_t i = 0; i < 9; ++i) EXPECT_EQ(lab.read<std::int32_t>("segmentation")[2 * i], 0);
 }
@@ -259,7 +240,7 @@ TEST(Camera, SeesWhatMuJoCoDraws) {
 TEST(Camera, BackgroundIsZeroOrMinusOne) {
   CameraSensorCfg cfg = camera(5, 5, {"rgb", "depth", "segmentation", "normals"});
   cfg.quat = {0, 1, 0, 0};  // looks up
-  Lab lab(R"(<worldbody><geom size=".1"/></worldbody>)", {cfg});
+  CameraLab lab(R"(<worldbody><geom size=".1"/></worldbody>)", {cfg});
   for (auto v : lab.read<std::uint8_t>("rgb")) EXPECT_EQ(v, 0);
   for (auto v : lab.read<float>("depth")) EXPECT_EQ(v, 0);
   for (auto v : lab.read<std::int32_t>("segmentation")) EXPECT_EQ(v, -1);
@@ -271,12 +252,12 @@ TEST(Camera, DistantTexturesKeepTheirBorders) {
   CameraSensorCfg cfg = camera(40, 40, {"rgb"});
   cfg.pos = {0, 0, 4};
   // 15 x 15 texels, the outermost ones white, and two texels per pixel.
-  Lab lab(R"(<asset><texture name="t" type="2d" builtin="flat" mark="edge" rgb1="0 0 0"
+  CameraLab lab(R"(<asset><texture name="t" type="2d" builtin="flat" mark="edge" rgb1="0 0 0"
                      markrgb="1 1 1" width="15" height="15"/>
                <material name="m" texture="t" texrepeat="6.4 6.4" emission="1" specular="0"/></asset>
              <worldbody><light active="false"/><geom type="plane" size="2 2 .1" material="m"/>
              </worldbody>)",
-          {cfg});
+                {cfg});
   const auto rgb = lab.read<std::uint8_t>("rgb");
   const double mean = std::accumulate(rgb.begin(), rgb.end(), 0.0) / rgb.size();
   EXPECT_NEAR(mean, 255 * (15 * 15 - 13 * 13) / (15.0 * 15), 8);
@@ -286,7 +267,7 @@ TEST(Camera, ClipRangeHidesWhatIsNearerOrFarther) {
   CameraSensorCfg cfg = camera(8, 6, {"segmentation"}, "w/top");
   cfg.near = 2.9;
   cfg.far = 3.5;
-  Lab lab(kCases, {cfg});
+  CameraLab lab(kCases, {cfg});
   const auto ids = lab.read<std::int32_t>("segmentation");
   EXPECT_EQ(ids[2 * (8 * 2 + 3)], 1);
   EXPECT_EQ(ids[0], -1);               // the floor is too far
@@ -314,8 +295,8 @@ std::vector<std::byte> rows(int worlds, int threads, int world, int width, int h
   sim::SimulationCfg sim;
   sim.num_worlds = worlds;
   sim.threads = threads;
-  Lab lab(kShow, {cfg}, sim);
-  lab.pose(world, {0.1, 0.05, 0.8, 0.9, 0.3, 0.2, 0.1});
+  CameraLab lab(kShow, {cfg}, sim);
+  lab.pose({0.1, 0.05, 0.8, 0.9, 0.3, 0.2, 0.1}, world);
   lab.sim->refresh(lab.scene->sensor("cam"));
   std::vector<std::byte> all;
   for (const Field& f : lab.scene->sensor("cam").fields()) {
@@ -336,11 +317,11 @@ TEST(Camera, ImagesAreBitEqualAtAnyThreadCountAndAmongAnyNumberOfWorlds) {
 TEST(Camera, TeleportedObjectIsInTheNextImage) {
   sim::SimulationCfg sim;
   sim.num_worlds = 3;
-  Lab lab(
+  CameraLab lab(
       R"(<worldbody><body><joint type="slide" axis="1 0 0"/><geom size=".2"/></body></worldbody>)",
       {camera(21, 21, {"segmentation"})}, sim);
   EXPECT_EQ(lab.read<std::int32_t>("segmentation", "cam", 1)[2 * (10 * 21 + 10)], 0);
-  lab.pose(1, {5.0});
+  lab.pose({5.0}, 1);
   EXPECT_EQ(lab.read<std::int32_t>("segmentation", "cam", 1)[2 * (10 * 21 + 10)], -1);
   EXPECT_EQ(lab.read<std::int32_t>("segmentation", "cam", 2)[2 * (10 * 21 + 10)], 0);
   lab.sim->reset(std::vector<int>{1});
@@ -351,7 +332,7 @@ TEST(Camera, OwnRateHoldsTheImageBetweenTicks) {
   CameraSensorCfg cfg = camera(9, 9, {"depth"});
   cfg.pos = {0, 0, 10};
   cfg.update_period = 0.01;  // 5 steps of 2 ms
-  Lab lab(R"(<worldbody><body><freejoint/><geom size=".2"/></body></worldbody>)", {cfg});
+  CameraLab lab(R"(<worldbody><body><freejoint/><geom size=".2"/></body></worldbody>)", {cfg});
   std::vector<float> seen;
   for (int i = 0; i < 11; ++i) {
     seen.push_back(lab.read<float>("depth")[40]);
@@ -379,7 +360,7 @@ TEST(Camera, ErrorElsewhereDoesNotLoseAnImage) {
   CameraSensorCfg cfg = camera(9, 9, {"depth"});
   cfg.pos = {0, 0, 10};
   cfg.update_period = 0.01;  // 5 steps of 2 ms
-  Lab lab(R"(<worldbody><body><freejoint/><geom size=".2"/></body></worldbody>)", {cfg});
+  CameraLab lab(R"(<worldbody><body><freejoint/><geom size=".2"/></body></worldbody>)", {cfg});
   const auto failing = std::make_shared<Failing>();
   lab.sim->add(failing);
   const float first = lab.read<float>("depth")[40];
@@ -396,7 +377,7 @@ TEST(Camera, ErrorElsewhereDoesNotLoseAnImage) {
 TEST(Camera, NoAllocationPerFrame) {
   CameraSensorCfg cfg = camera(40, 30, {"rgb", "depth", "segmentation", "normals"}, "w/c");
   cfg.use_shadows = true;
-  Lab lab(kShow, {cfg});
+  CameraLab lab(kShow, {cfg});
   Sensor& sensor = lab.scene->sensor("cam");
   lab.sim->step();
   lab.sim->refresh(sensor);
@@ -416,7 +397,7 @@ TEST(Camera, StereoNoiseGrowsWithTheSquareOfDepth) {
     cfg.pos = {0, 0, z};
     cfg.fovy = 60;
     cfg.depth_noise = "d435";
-    Lab lab(R"(<worldbody><geom type="plane" size="9 9 1"/></worldbody>)", {cfg});
+    CameraLab lab(R"(<worldbody><geom type="plane" size="9 9 1"/></worldbody>)", {cfg});
     const auto depth = lab.read<float>("depth");
     double sum = 0, square = 0;
     for (float d : depth) {
@@ -446,7 +427,7 @@ std::vector<float> depth_of_tilted_floor(double tilt_deg, int size, DepthNoise n
   cfg.quat = {std::cos(half), std::sin(half), 0, 0};
   cfg.fovy = 2;
   cfg.depth_noise = noise;
-  Lab lab(R"(<worldbody><geom type="plane" size="90 90 1"/></worldbody>)", {cfg});
+  CameraLab lab(R"(<worldbody><geom type="plane" size="90 90 1"/></worldbody>)", {cfg});
   return lab.read<float>("depth");
 }
 
@@ -468,15 +449,15 @@ TEST(Camera, StereoMeasuresNothingOutOfItsRange) {
   cfg.depth_noise = "d405";  // range 0.07 to 2 m
   const auto depth_at = [&](double z) {
     cfg.pos = {0, 0, z};
-    Lab lab(R"(<worldbody><geom type="plane" size="9 9 1"/></worldbody>)", {cfg});
+    CameraLab lab(R"(<worldbody><geom type="plane" size="9 9 1"/></worldbody>)", {cfg});
     return lab.read<float>("depth");
   };
-  EXPECT_THAT(depth_at(0.06), testing::Each(0.0f));
-  EXPECT_THAT(depth_at(2.3), testing::Each(0.0f));
-  EXPECT_THAT(depth_at(1.0), testing::Each(testing::Gt(0.0f)));
+  EXPECT_THAT(depth_at(0.06), ::testing::Each(0.0f));
+  EXPECT_THAT(depth_at(2.3), ::testing::Each(0.0f));
+  EXPECT_THAT(depth_at(1.0), ::testing::Each(::testing::Gt(0.0f)));
   // Near the end of the range, noise decides which pixels are lost.
   const auto border = depth_at(2.0);
-  EXPECT_THAT(border, testing::Each(testing::Le(2.0f)));
+  EXPECT_THAT(border, ::testing::Each(::testing::Le(2.0f)));
   EXPECT_NEAR(std::count(border.begin(), border.end(), 0.0f), 512, 120);
 }
 
@@ -484,9 +465,9 @@ TEST(Camera, StereoLosesHalfOfThePixelsAtEdges) {
   CameraSensorCfg cfg = camera(200, 200, {"depth", "segmentation"});
   cfg.pos = {0, 0, 3};
   cfg.depth_noise = "d435";
-  Lab lab(R"(<worldbody><geom type="plane" size="9 9 1"/>
+  CameraLab lab(R"(<worldbody><geom type="plane" size="9 9 1"/>
              <geom type="box" size=".5 .5 .5" pos="0 0 .5"/></worldbody>)",
-          {cfg});
+                {cfg});
   const auto depth = lab.read<float>("depth");
   const auto ids = lab.read<std::int32_t>("segmentation");
   int edges = 0, lost = 0, lost_elsewhere = 0;
@@ -508,7 +489,7 @@ TEST(Camera, OwnRateNeedNotBeAMultipleOfSteps) {
   cfg.pos = {0, 0, 10};
   cfg.update_period = 1.0 / 30;  // 16.67 steps of 2 ms
   cfg.phase = 0.01;
-  Lab lab(R"(<worldbody><body><freejoint/><geom size=".2"/></body></worldbody>)", {cfg});
+  CameraLab lab(R"(<worldbody><body><freejoint/><geom size=".2"/></body></worldbody>)", {cfg});
   std::vector<int> taken;
   float last = lab.read<float>("depth")[40];
   for (int step = 1; step <= 500; ++step) {  // 1 s
@@ -529,7 +510,7 @@ TEST(Camera, OwnFieldOfViewDoesNotAffectOtherSensors) {
   map.name = "map";
   map.fovy = 3;
   map.orthographic = true;
-  Lab lab(kCases, {wide, plain, map});
+  CameraLab lab(kCases, {wide, plain, map});
   // Pixels per unit of X/Z: 6 / .006 * .006 from the sensor, 3 from 90 degrees, and 6 pixels on 3
   // m.
   EXPECT_NEAR(lab.read<float>("intrinsics", "cam")[4], 6, 1e-4);
@@ -552,20 +533,20 @@ TEST(Camera, ErrorsNameTheSetting) {
   cfg.data_types = {};
   EXPECT_THAT(message([&] { cfg.build(); }), HasSubstr("data_types is empty"));
   cfg = camera(4, 3, {"rgb"}, "w/tpo");
-  EXPECT_THAT(message([&] { Lab(kCases, {cfg}); }),
+  EXPECT_THAT(message([&] { CameraLab(kCases, {cfg}); }),
               HasSubstr("no camera named 'w/tpo'; did you mean 'w/top'?"));
   cfg = camera(4, 3, {"rgb"});
   cfg.name = "w/top";
-  EXPECT_THAT(message([&] { Lab(kCases, {cfg}); }), HasSubstr("repeated name"));
+  EXPECT_THAT(message([&] { CameraLab(kCases, {cfg}); }), HasSubstr("repeated name"));
   cfg.name = "cam";
   cfg.parent_body = "w/none";
-  EXPECT_THAT(message([&] { Lab(kCases, {cfg}); }), HasSubstr("no body named 'w/none'"));
+  EXPECT_THAT(message([&] { CameraLab(kCases, {cfg}); }), HasSubstr("no body named 'w/none'"));
   cfg = camera(0, 3, {"rgb"});
   EXPECT_THAT(message([&] { cfg.build(); }), HasSubstr("width is 0: must be between 1 and 16384"));
   const auto with = [&](auto change, std::string wrapped = "") {
     CameraSensorCfg c = camera(4, 3, {"rgb", "depth"}, std::move(wrapped));
     change(c);
-    return message([&] { Lab(kCases, {c}); });
+    return message([&] { CameraLab(kCases, {c}); });
   };
   using Cfg = CameraSensorCfg;
   constexpr double kNan = std::numeric_limits<double>::quiet_NaN();

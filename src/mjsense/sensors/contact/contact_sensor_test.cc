@@ -10,6 +10,7 @@
 #include "mjsense/core/error.h"
 #include "mjsense/core/testing/error_of.h"
 #include "mjsense/scene/scene.h"
+#include "mjsense/sensors/testing/lab.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense::sensors {
@@ -33,31 +34,16 @@ ContactSensorCfg box_cfg(std::string pattern = "box_geom") {
 }
 
 // A scene with one entity and these contact sensors.
-struct Lab {
-  std::shared_ptr<scene::Scene> scene;
-  std::unique_ptr<sim::Simulation> sim;
+struct ContactLab : testing::Lab {
+  ContactLab(std::string entity, std::string xml, std::vector<ContactSensorCfg> sensors,
+             sim::SimulationCfg cfg = {})
+      : Lab(std::move(entity), std::move(xml), shared(std::move(sensors)), cfg) {}
 
-  Lab(std::string entity, std::string xml, std::vector<ContactSensorCfg> sensors,
-      sim::SimulationCfg cfg = {}) {
-    scene::SceneCfg s;
-    scene::EntityCfg e;
-    e.model.xml = std::move(xml);
-    s.entities.emplace_back(std::move(entity), e);
-    for (ContactSensorCfg& c : sensors) s.sensors.push_back(std::make_shared<ContactSensorCfg>(c));
-    scene = std::make_shared<scene::Scene>(std::move(s));
-    sim = std::make_unique<sim::Simulation>(scene, cfg);
-  }
   ContactSensor& sensor(std::string_view name = "c") {
     return dynamic_cast<ContactSensor&>(scene->sensor(name));
   }
   std::vector<float> read(std::string_view field, std::string_view name = "c") {
-    sim->refresh(scene->sensor(name));
-    const auto all = scene->sensor(name).field(field).data.all<float>();
-    return {all.begin(), all.end()};
-  }
-  void pose(std::initializer_list<double> qpos, int world = 0) {
-    const ArrayView v = sim->worlds().state_component("qpos");
-    std::copy(qpos.begin(), qpos.end(), reinterpret_cast<double*>(v.data + world * v.strides[0]));
+    return Lab::read(field, name);
   }
 };
 
@@ -69,7 +55,7 @@ TEST(Contact, BoxOnTheFloorPushesDownWithItsWeight) {
   slots.fields = {"force", "normal", "tangent"};
   slots.global_frame = true;
   slots.num_slots = 4;
-  Lab lab("box", kBox, {net, slots});
+  ContactLab lab("box", kBox, {net, slots});
   lab.pose({0, 0, 0.1, 1, 0, 0, 0});
   lab.sim->forward();
   for (int i = 0; i < 1000; ++i) lab.sim->step();
@@ -103,7 +89,7 @@ TEST(Contact, FrictionHoldsAlongBothTangents) {
       sensors.push_back(c);
     }
   }
-  Lab lab("box", kBox, sensors);
+  ContactLab lab("box", kBox, sensors);
   lab.pose({0, 0, 0.1, 1, 0, 0, 0});
   const ArrayView push = lab.sim->worlds().state_component("qfrc_applied");
   auto* f = reinterpret_cast<double*>(push.data);
@@ -259,9 +245,10 @@ ContactSensorCfg feet_cfg(std::string name, NamedEnum<ContactMode> mode,
 TEST(Contact, ContactInBothDirectionsIsInBothPairs) {
   ContactSensorCfg net = feet_cfg("net", "subtree", {"trunk", "L", "R"});
   net.reduce = "netforce";
-  Lab lab("bot", kFeet,
-          {feet_cfg("bodies", "body", {"L", "R"}), feet_cfg("subtrees", "subtree", {"L", "R"}),
-           feet_cfg("geoms", "geom", {"R", "L"}), net});
+  ContactLab lab(
+      "bot", kFeet,
+      {feet_cfg("bodies", "body", {"L", "R"}), feet_cfg("subtrees", "subtree", {"L", "R"}),
+       feet_cfg("geoms", "geom", {"R", "L"}), net});
   lab.sim->forward();
   for (const char* name : {"bodies", "subtrees", "geoms"}) {
     EXPECT_THAT(lab.read("found", name), ElementsAre(1))
@@ -287,14 +274,14 @@ TEST(Contact, WithoutAnEntityPatternsAreFullNamesOrRegularExpressions) {
     c.primary = {"geom", std::move(pattern), "", std::move(exclude)};
     return c;
   };
-  Lab lab("bot", kFeet,
-          {cfg("names", {"bot/R", "bot/L"}, {}), cfg("regex", {"bot/[LR]"}, {}),
-           cfg("exclude", {"bot/.*"}, {"bot/L", "geom_."})});
+  ContactLab lab("bot", kFeet,
+                 {cfg("names", {"bot/R", "bot/L"}, {}), cfg("regex", {"bot/[LR]"}, {}),
+                  cfg("exclude", {"bot/.*"}, {"bot/L", "geom_."})});
   EXPECT_THAT(lab.sensor("names").primary_names(), ElementsAre("bot/R", "bot/L"));
   EXPECT_THAT(lab.sensor("regex").primary_names(), ElementsAre("bot/L", "bot/R"));
   EXPECT_THAT(lab.sensor("exclude").primary_names(), ElementsAre("bot/R"));
-  EXPECT_THROW(Lab("bot", kFeet, {cfg("none", {"foot.*"}, {})}), ValueError);
-  EXPECT_THROW(Lab("bot", kFeet, {cfg("twice", {"bot/L", "bot/[LR]"}, {})}), ValueError);
+  EXPECT_THROW(ContactLab("bot", kFeet, {cfg("none", {"foot.*"}, {})}), ValueError);
+  EXPECT_THROW(ContactLab("bot", kFeet, {cfg("twice", {"bot/L", "bot/[LR]"}, {})}), ValueError);
 }
 
 TEST(Contact, ExcludeRemovesSecondaries) {
@@ -305,7 +292,7 @@ TEST(Contact, ExcludeRemovesSecondaries) {
   first.secondary->exclude = {"geom_0", "^L$"};
   literal.secondary->exclude = {"R"};
   first.secondary_policy = literal.secondary_policy = "first";
-  Lab lab("bot", kFeet, {each, first, literal});
+  ContactLab lab("bot", kFeet, {each, first, literal});
   lab.sim->forward();
   // "geom_" has no special character: it excludes an exact name.
   EXPECT_THAT(lab.sensor("each").secondary_names(), ElementsAre("geom_0", "R"));
@@ -318,7 +305,7 @@ TEST(Contact, ExcludeRemovesSecondaries) {
     ContactSensorCfg c = feet_cfg("none", "subtree", {"L"});
     c.secondary_policy = policy;
     c.secondary->exclude = {"L"};
-    EXPECT_THAT([&] { Lab("bot", kFeet, {c}); },
+    EXPECT_THAT([&] { ContactLab("bot", kFeet, {c}); },
                 ::testing::ThrowsMessage<ValueError>(
                     HasSubstr("sensor 'none': secondary: exclude removes every match: L")))
         << enum_name(policy);
@@ -354,8 +341,8 @@ TEST(Contact, WithoutForcesNeedsPositionsOnly) {
   found.fields = {"found"};
   net.fields = {"found", "force", "pos"};
   net.reduce = "netforce";
-  Lab late("box", kBox, {found, net}), first("box", kBox, {found, net});
-  for (Lab* lab : {&late, &first}) {
+  ContactLab late("box", kBox, {found, net}), first("box", kBox, {found, net});
+  for (ContactLab* lab : {&late, &first}) {
     lab->pose({0, 0, 0.12, 0.97, 0.2, 0.14, 0});
     lab->sim->forward();
   }
@@ -374,7 +361,7 @@ TEST(Contact, WithoutForcesNeedsPositionsOnly) {
 }
 
 TEST(Contact, PartsAreMuJoCosPerFieldSensors) {
-  Lab lab("box", kBox, {box_cfg()});
+  ContactLab lab("box", kBox, {box_cfg()});
   EXPECT_TRUE(lab.scene->find_sensor("c_box_geom_found"));
   lab.pose({0, 0, 0.0995, 1, 0, 0, 0});
   lab.sim->forward();
@@ -408,7 +395,7 @@ TEST(Contact, InvalidConfigurationsAreRefusedAtBuild) {
 
 TEST(Contact, ErrorsNameSensorAndNearest) {
   const auto message = [](ContactSensorCfg cfg) -> std::string {
-    return error_of([&] { Lab lab("box", kBox, {std::move(cfg)}); });
+    return error_of([&] { ContactLab lab("box", kBox, {std::move(cfg)}); });
   };
   EXPECT_THAT(message(box_cfg("BOX_GEOM")), HasSubstr("Not all regular expressions are matched"));
   ContactSensorCfg c = box_cfg();
@@ -441,7 +428,7 @@ TEST(Contact, NetforceNamesTheStrongestContact) {
   net.reduce = "netforce";
   net.fields = {"found"};
   net.other_ids = true;
-  Lab lab("box", kTray, {net});
+  ContactLab lab("box", kTray, {net});
   lab.sim->step(500);
   EXPECT_EQ(lab.read("found")[0], 3.0f);
   const mjModel* m = lab.scene->model();

@@ -35,12 +35,12 @@ constexpr char kRoom[] = R"(
     <geom size=".05" mass="1" group="2"/><site name="lidar"/></body>
 </worldbody></mujoco>)";
 
-struct Lab {
+struct LidarLab {
   std::shared_ptr<LidarSensorCfg> cfg = std::make_shared<LidarSensorCfg>();
   std::shared_ptr<scene::Scene> scene;
   std::unique_ptr<sim::Simulation> sim;
 
-  Lab() {
+  LidarLab() {
     cfg->name = "lidar";
     cfg->frame = {{"site", "lidar", "r"}};
     cfg->include_geom_groups = {{0}};
@@ -67,7 +67,7 @@ struct Lab {
 };
 
 TEST(Lidar, RoundRoomIsEquallyFarEverywhere) {
-  Lab lab;
+  LidarLab lab;
   lab.start();
   EXPECT_THAT(lab.read("distances"), Each(FloatNear(5, 1e-5f)));
   EXPECT_THAT(lab.read("intensity"), Each(FloatNear(0.5f, 1e-5f)));
@@ -82,7 +82,7 @@ TEST(Lidar, RoundRoomIsEquallyFarEverywhere) {
 //   [red, own colour]   lidar at the origin   [material over own colour]
 // Intensity is the mean of red, green and blue times the cosine of incidence.
 TEST(Lidar, IntensityIsAlbedoTimesCosine) {
-  Lab lab;
+  LidarLab lab;
   constexpr char kWalls[] =
       R"(<mujoco><asset><material name="m" rgba=".2 .4 .9 1"/></asset><worldbody>
     <geom type="box" size=".1 9 9" pos="-2.1 0 0" rgba=".9 .1 .2 1"/>
@@ -113,7 +113,7 @@ TEST(Lidar, IntensityIsAlbedoTimesCosine) {
 
 // There is no element of a geom to read, and every ray misses.
 TEST(Lidar, SeesNothingInASceneWithoutGeoms) {
-  Lab lab;
+  LidarLab lab;
   lab.cfg->frame = {{"site", "s", ""}};
   lab.cfg->scan = SpinningScan{.channels = 2, .elevations_deg = {-10, 10}, .samples = 21};
   scene::SceneCfg s;
@@ -128,7 +128,7 @@ TEST(Lidar, SeesNothingInASceneWithoutGeoms) {
 
 // A return that noise moves above max_distance or below min_distance is lost.
 TEST(Lidar, NoiseLeavesNoReturnBeyondTheRange) {
-  Lab lab;
+  LidarLab lab;
   lab.cfg->range_noise_std = 0.05;
   lab.cfg->min_distance = 0.5;
   lab.cfg->max_distance = 5.02;  // the room is at 5 m
@@ -158,7 +158,7 @@ TEST(Lidar, NoiseLeavesNoReturnBeyondTheRange) {
 }
 
 TEST(Lidar, UsesTheGivenElevations) {
-  Lab lab;
+  LidarLab lab;
   lab.cfg->scan = SpinningScan{.channels = 3, .elevations_deg = {-40, 3, 60}, .samples = 1};
   lab.start();
   const std::vector<float> p = lab.read("points");
@@ -169,7 +169,7 @@ TEST(Lidar, UsesTheGivenElevations) {
 }
 
 TEST(Lidar, RaysOfAFrameOnTheWorldBodyHitTheWorld) {
-  Lab lab;
+  LidarLab lab;
   lab.cfg->frame = {{"body", "world", ""}};
   lab.start();
   EXPECT_THAT(lab.read("distances"), Each(FloatNear(5, 1e-5f)));
@@ -177,7 +177,7 @@ TEST(Lidar, RaysOfAFrameOnTheWorldBodyHitTheWorld) {
 
 TEST(Lidar, NoiseHasItsDeviationAndDependsOnTheSeedOnly) {
   const auto run = [](int threads, int worlds, std::uint64_t seed) {
-    Lab lab;
+    LidarLab lab;
     lab.cfg->range_noise_std = 0.03;
     lab.cfg->range_noise_relative = 0.008;  // 0.04 m at 5 m: 0.05 m in total
     lab.cfg->dropout = 0.1;
@@ -204,7 +204,7 @@ TEST(Lidar, NoiseHasItsDeviationAndDependsOnTheSeedOnly) {
 }
 
 TEST(Lidar, MotionDistortsTheSweep) {
-  Lab lab;
+  LidarLab lab;
   lab.cfg->include_geom_groups = {{1}};  // the wall at x = 4
   lab.cfg->motion_distortion = true;
   // One laser that always points along +x. In a spinning scan an azimuth span of nearly 0 would
@@ -225,7 +225,7 @@ TEST(Lidar, MotionDistortsTheSweep) {
 
 TEST(Lidar, NoiseMovesDistortedReturnsAlongTheirOwnRays) {
   const auto run = [](auto change) {
-    Lab lab;
+    LidarLab lab;
     lab.cfg->motion_distortion = true;
     change(*lab.cfg);
     lab.start();
@@ -247,7 +247,7 @@ TEST(Lidar, NoiseMovesDistortedReturnsAlongTheirOwnRays) {
 }
 
 TEST(Lidar, BeforeTheFirstPoseTheFrameIsAtRest) {
-  Lab lab;
+  LidarLab lab;
   lab.cfg->include_geom_groups = {{1}};
   lab.cfg->motion_distortion = true;
   lab.start();
@@ -260,7 +260,7 @@ TEST(Lidar, BeforeTheFirstPoseTheFrameIsAtRest) {
 
 // A frame that is moved when an episode begins was not moving during the sweep before.
 TEST(Lidar, ResetClearsThePoseHistory) {
-  Lab lab;
+  LidarLab lab;
   lab.cfg->include_geom_groups = {{1}};  // the wall at x = 4
   lab.cfg->motion_distortion = true;
   lab.cfg->scan =
@@ -274,7 +274,7 @@ TEST(Lidar, ResetClearsThePoseHistory) {
 }
 
 TEST(Lidar, TableAdvancesWithEveryScan) {
-  Lab lab;
+  LidarLab lab;
   std::vector<std::array<double, 2>> angles;
   for (int i = 0; i < 30; ++i) angles.push_back({0.01 * i, 0.0});
   lab.cfg->scan = TableScan{.angles = angles, .rays_per_scan = 10, .rate_hz = 100};
@@ -288,7 +288,7 @@ TEST(Lidar, TableAdvancesWithEveryScan) {
 
 TEST(Lidar, ErrorsNameTheSetting) {
   const auto with = [](auto change) -> std::string {
-    Lab lab;
+    LidarLab lab;
     change(*lab.cfg);
     return error_of([&] { lab.start(); });
   };

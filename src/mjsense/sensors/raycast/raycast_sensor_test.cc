@@ -13,6 +13,7 @@
 #include "mjsense/core/mujoco_objects.h"
 #include "mjsense/core/testing/error_of.h"
 #include "mjsense/scene/scene.h"
+#include "mjsense/sensors/testing/lab.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense::sensors {
@@ -56,30 +57,14 @@ std::shared_ptr<Cfg> sensor_cfg(std::string name = "ray") {
   return cfg;
 }
 
-struct Lab {
-  std::shared_ptr<scene::Scene> scene;
-  std::unique_ptr<sim::Simulation> sim;
+struct RayLab : testing::Lab {
+  explicit RayLab(std::vector<std::shared_ptr<const SensorCfg>> sensors,
+                  sim::SimulationCfg cfg = {})
+      : Lab("r", kRobot, std::move(sensors), cfg) {}
 
-  explicit Lab(std::vector<std::shared_ptr<const SensorCfg>> sensors, sim::SimulationCfg cfg = {}) {
-    scene::SceneCfg s;
-    s.entities.emplace_back("r", scene::EntityCfg{.model = {.xml = kRobot}});
-    s.sensors = std::move(sensors);
-    scene = std::make_shared<scene::Scene>(std::move(s));
-    sim = std::make_unique<sim::Simulation>(scene, cfg);
-  }
   template <class T = float>
   std::vector<T> read(std::string_view field, std::string_view name = "ray") {
-    Sensor& sensor = scene->sensor(name);
-    sim->refresh(sensor);
-    const auto all = sensor.field(field).data.all<T>();
-    return {all.begin(), all.end()};
-  }
-  // Sets the position and the quaternion (wxyz) of the base.
-  void pose(std::initializer_list<double> qpos, int world = 0) {
-    const ArrayView v = sim->worlds().state_component("qpos");
-    std::copy(qpos.begin(), qpos.end(), reinterpret_cast<double*>(v.data + world * v.strides[0]));
-    const int ids[] = {world};
-    sim->forward(ids);
+    return Lab::read<T>(field, name);
   }
 };
 
@@ -105,7 +90,7 @@ TEST(RayCast, InvalidConfigurationsAreRefusedAtBuild) {
 }
 
 TEST(RayCast, SeesItsChildButNotItself) {
-  Lab lab({sensor_cfg<RayCastSensorCfg>()});
+  RayLab lab({sensor_cfg<RayCastSensorCfg>()});
   EXPECT_THAT(lab.read("distances"), ElementsAre(FloatNear(0.45f, 1e-6f)));
   EXPECT_THAT(lab.read("normals_w"), Pointwise(FloatNear(1e-6f), {0.0f, 0.0f, 1.0f}));
   EXPECT_THAT(lab.read("hit_pos_w"), Pointwise(FloatNear(1e-6f), {0.0f, 0.0f, 1.55f}));
@@ -118,7 +103,7 @@ TEST(RayCast, SeesItsChildButNotItself) {
 TEST(RayCast, CanSeeItselfFromInside) {
   auto cfg = sensor_cfg<RayCastSensorCfg>();
   cfg->exclude_parent_body = false;
-  Lab lab({cfg});
+  RayLab lab({cfg});
   EXPECT_THAT(lab.read("distances"), ElementsAre(FloatNear(0.1f, 1e-6f)));
   EXPECT_THAT(lab.read("normals_w"), Pointwise(FloatNear(1e-6f), {0.0f, 0.0f, -1.0f}));
 }
@@ -126,7 +111,7 @@ TEST(RayCast, CanSeeItselfFromInside) {
 TEST(RayCast, MissReportsTheOrigin) {
   auto cfg = sensor_cfg<RayCastSensorCfg>();
   cfg->pattern = GridPattern{.size = {0, 0}, .direction = {0, 0, 1}};
-  Lab lab({cfg});
+  RayLab lab({cfg});
   lab.pose({-1, 2, 3, 1, 0, 0, 0});
   EXPECT_THAT(lab.read("distances"), ElementsAre(-1.0f));
   EXPECT_THAT(lab.read("normals_w"), Each(0.0f));
@@ -139,7 +124,7 @@ TEST(RayCast, DistancesAtBothLimitsCount) {
   cfg->ray_alignment = "world";
   cfg->max_distance = 2.1;
   cfg->min_distance = 1.9;
-  Lab lab({cfg});
+  RayLab lab({cfg});
   const auto distance = [&](double z) {
     // The base is on its side, so that its child is not below it.
     lab.pose({-10, 0, z, kOnItsSide, kOnItsSide, 0, 0});
@@ -160,7 +145,7 @@ TEST(RayCast, AlignmentTurnsRaysButNotTheFrame) {
     cfg->ray_alignment = alignment;
     cfgs.push_back(cfg);
   }
-  Lab lab(cfgs);
+  RayLab lab(cfgs);
   const double c = std::cos(0.1), s = std::sin(0.1);
   lab.pose({-2, 0, 2, c, 0, s, 0});  // pitched by 0.2 rad
   const std::vector<float> base = lab.read("hit_pos_w", "base"), yaw = lab.read("hit_pos_w", "yaw"),
@@ -198,7 +183,7 @@ TEST(RayCast, HeadingDoesNotFlipAtTheVertical) {
 TEST(RayCast, LargestComponentOfAQuaternionIsPositive) {
   auto cfg = sensor_cfg<RayCastSensorCfg>();
   cfg->frame = {{"body", "base", "r"}, {"body", "belly", "r"}};
-  Lab lab({cfg});
+  RayLab lab({cfg});
   const auto expect = [&](std::initializer_list<double> unnormalised) {
     double q[4];
     std::copy(unnormalised.begin(), unnormalised.end(), q);
@@ -232,7 +217,7 @@ TEST(RayCast, GroupsAndTransparencyBelongToTheQuery) {
        third = sensor_cfg<RayCastSensorCfg>("third");
   third->include_geom_groups = {{3}};
   seen->ray_alignment = third->ray_alignment = "world";
-  Lab lab({seen, third});
+  RayLab lab({seen, third});
   lab.pose({-4, 0, 2, kOnItsSide, kOnItsSide, 0, 0});
   EXPECT_FLOAT_EQ(lab.read("distances", "default")[0], 2.0f);
   EXPECT_FLOAT_EQ(lab.read("distances", "third")[0], 0.9f);
@@ -247,7 +232,7 @@ TEST(RayCast, AcceptsCamerasAndSeveralFrames) {
   cfg->frame = {{"camera", "eye", "r"}, {"xbody", "belly", "r"}};
   cfg->pattern = PinholePattern::from_mujoco_camera("r/eye");
   cfg->exclude_parent_body = false;  // the camera and the floor both belong to the world body
-  Lab lab({cfg});
+  RayLab lab({cfg});
   lab.pose({-10, 0, 5, 1, 0, 0, 0});
   const std::vector<float> d = lab.read("distances");
   ASSERT_EQ(d.size(), 24u);
@@ -260,7 +245,7 @@ TEST(RayCast, AcceptsCamerasAndSeveralFrames) {
 }
 
 TEST(RayCast, TeleportChangesTheNextReadingOfItsWorldOnly) {
-  Lab lab({sensor_cfg<RayCastSensorCfg>()}, {.num_worlds = 3});
+  RayLab lab({sensor_cfg<RayCastSensorCfg>()}, {.num_worlds = 3});
   const std::vector<float> before = lab.read("hit_pos_w");
   lab.pose({-7, 1, 9, 1, 0, 0, 0}, 1);
   const std::vector<float> after = lab.read("hit_pos_w");
@@ -339,7 +324,7 @@ TEST(RayCast, BitEqualAtAnyNumberOfThreadsAndWorlds) {
   const auto run = [](int threads, int worlds) {
     auto cfg = sensor_cfg<RayCastSensorCfg>();
     cfg->pattern = GridPattern{.size = {4, 3}, .resolution = 0.07, .direction = {0.2, 0.1, -1}};
-    Lab lab({cfg}, {.num_worlds = worlds, .threads = threads});
+    RayLab lab({cfg}, {.num_worlds = worlds, .threads = threads});
     for (int w = 0; w < worlds; ++w) lab.pose({0.3, 0.1 * w, 2, 0.9, 0.1, 0.2 + 0.01 * w, 0.3}, w);
     lab.sim->step(3);
     return lab.read("distances");
@@ -354,7 +339,7 @@ TEST(RayCast, ErrorsNameSensorFoundAndExpected) {
   const auto with = [](auto change) {
     auto cfg = sensor_cfg<RayCastSensorCfg>();
     change(*cfg);
-    return error_of([&] { Lab lab({cfg}); });
+    return error_of([&] { RayLab lab({cfg}); });
   };
   using Cfg = RayCastSensorCfg;
   EXPECT_THAT(
@@ -401,7 +386,7 @@ TEST(RayCast, DrawsHitsRaysAndNormals) {
   auto cfg = sensor_cfg<RayCastSensorCfg>();
   cfg->pattern = UserPattern{{{0, 0, 0}}, {{0, 0, -1}, {0, 0, 1}}};
   cfg->viz.show_rays = cfg->viz.show_normals = true;
-  Lab lab({cfg});
+  RayLab lab({cfg});
   EXPECT_TRUE(lab.sim->draw(0).list().empty());  // without debug_vis
   Sensor* sensor[] = {&lab.scene->sensor("ray")};
   const DebugShapes shapes = lab.sim->draw(0, sensor);

@@ -9,6 +9,7 @@
 
 #include "mjsense/core/error.h"
 #include "mjsense/scene/scene.h"
+#include "mjsense/sensors/testing/lab.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense::sensors {
@@ -34,7 +35,7 @@ constexpr char kField[] = R"(
   </body>
 </worldbody></mujoco>)";
 
-constexpr double kOnItsSide = 0.70710678118654752;  // w and x of a rotation by 90 degrees about x
+constexpr double kHalfRoot = 0.70710678118654752;  // w and x of a rotation by 90 degrees about x
 
 std::shared_ptr<TerrainHeightSensorCfg> height(HeightReduction reduction = HeightReduction::kMin) {
   auto cfg = std::make_shared<TerrainHeightSensorCfg>();
@@ -47,31 +48,18 @@ std::shared_ptr<TerrainHeightSensorCfg> height(HeightReduction reduction = Heigh
   return cfg;
 }
 
-struct Lab {
-  std::shared_ptr<scene::Scene> scene;
-  std::unique_ptr<sim::Simulation> sim;
+struct HeightLab : testing::Lab {
+  explicit HeightLab(std::shared_ptr<const SensorCfg> cfg) : Lab("r", kField, {std::move(cfg)}) {}
 
-  explicit Lab(std::shared_ptr<const SensorCfg> cfg) {
-    scene::SceneCfg s;
-    s.entities.emplace_back("r", scene::EntityCfg{.model = {.xml = kField}});
-    s.sensors = {std::move(cfg)};
-    scene = std::make_shared<scene::Scene>(std::move(s));
-    sim = std::make_unique<sim::Simulation>(scene, sim::SimulationCfg{});
-  }
   // Heights when the foot is at (x, 0, z), on its side.
   std::vector<float> at(double x, double z) {
-    const double qpos[] = {x, 0, z, kOnItsSide, kOnItsSide, 0, 0};
-    std::ranges::copy(qpos, reinterpret_cast<double*>(sim->worlds().state_component("qpos").data));
-    sim->forward();
-    Sensor& sensor = scene->sensor("height");
-    sim->refresh(sensor);
-    const auto row = sensor.field("heights").data.row<float>(0);
-    return {row.begin(), row.end()};
+    pose({x, 0, z, kHalfRoot, kHalfRoot, 0, 0});
+    return read("heights", "height", 0);
   }
 };
 
 TEST(TerrainHeight, IsFromTheFrameToTheGroundBelow) {
-  Lab lab(height());
+  HeightLab lab(height());
   EXPECT_THAT(lab.at(-2, 0.25), ElementsAre(FloatNear(0.25f, 1e-6f)));
   EXPECT_THAT(lab.at(1.5, 0.7), ElementsAre(FloatNear(0.2f, 1e-6f)));
 }
@@ -81,7 +69,7 @@ TEST(TerrainHeight, ReducesTheRaysOfAFrame) {
   const auto over_the_edge = [](HeightReduction reduction) {
     auto cfg = height(reduction);
     cfg->pattern = GridPattern{.size = {0.2, 0}, .resolution = 0.1};
-    return Lab(cfg).at(0.49, 0.7);
+    return HeightLab(cfg).at(0.49, 0.7);
   };
   EXPECT_THAT(over_the_edge(HeightReduction::kMin), ElementsAre(FloatNear(0.2f, 1e-6f)));
   EXPECT_THAT(over_the_edge(HeightReduction::kMax), ElementsAre(FloatNear(0.7f, 1e-6f)));
@@ -94,11 +82,11 @@ TEST(TerrainHeight, RaysThatMissGiveTheLimit) {
   auto cfg = height(HeightReduction::kNone);
   cfg->pattern = GridPattern{.size = {0.2, 0}, .resolution = 0.1};
   // Two rays would hit the floor, which is more than max_distance below; the third hits the step.
-  EXPECT_THAT(Lab(cfg).at(0.49, 1.2), Pointwise(FloatNear(1e-6f), {1.0f, 1.0f, 0.7f}));
+  EXPECT_THAT(HeightLab(cfg).at(0.49, 1.2), Pointwise(FloatNear(1e-6f), {1.0f, 1.0f, 0.7f}));
 }
 
 TEST(TerrainHeight, IfAllRaysMissTheGroundBelowIsUsed) {
-  Lab lab(height());
+  HeightLab lab(height());
   EXPECT_THAT(lab.at(-2, 50), ElementsAre(1.0f)) << "far above";
   EXPECT_THAT(lab.at(-2, -0.3), ElementsAre(0.0f)) << "inside the floor";
   EXPECT_THAT(lab.at(1.5, 0.4), ElementsAre(0.0f)) << "inside the step";
@@ -112,7 +100,7 @@ TEST(TerrainHeight, EveryFrameHasItsOwnHeight) {
   cfg->frame = {{"body", "foot", "r"}, {"site", "toe", "r"}};
   // The toe is 0.1 m below the foot in the foot's axes. When the foot lies on its side, both have
   // the same height.
-  EXPECT_THAT(Lab(cfg).at(-2, 0.5), Pointwise(FloatNear(1e-6f), {0.5f, 0.5f}));
+  EXPECT_THAT(HeightLab(cfg).at(-2, 0.5), Pointwise(FloatNear(1e-6f), {0.5f, 0.5f}));
 }
 
 }  // namespace

@@ -14,7 +14,7 @@
 namespace mjsense::tasks::policies {
 namespace {
 
-struct DoorPlan : testing::Test, episode::PlayedTask<tasks::DoorOpeningTask> {
+struct DoorPlan : ::testing::Test, episode::PlayedTask<tasks::DoorOpeningTask> {
   static episode::TaskCfg cfg() {
     episode::TaskCfg cfg = episode::task_cfg("rby1");
     cfg.horizon = 400;

@@ -10,7 +10,7 @@ namespace mjsense::tasks::policies {
 namespace {
 
 // RB-Y1 in front of a table.
-struct Shifted : testing::Test {
+struct Shifted : ::testing::Test {
   TableStage stage{"rby1"};
   BaseReposition shift{stage.world.model, stage.robot()};
   // Forward distance (m) of the base in `there` from its present position.

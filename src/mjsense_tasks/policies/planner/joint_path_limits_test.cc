@@ -95,7 +95,7 @@ std::string said(const Case& c, std::int64_t episode, const MotionQuality::Great
   return out.str();
 }
 
-class MotionLimits : public testing::TestWithParam<Case> {};
+class MotionLimits : public ::testing::TestWithParam<Case> {};
 
 // MJSENSE_FIRST and MJSENSE_EPISODES select other episodes.
 TEST_P(MotionLimits, CommandsStayWithinTheLimits) {
@@ -125,9 +125,9 @@ TEST_P(MotionLimits, CommandsStayWithinTheLimits) {
       printf(
           "%s %d: %s %d steps; %.2f rad/s2 told, %.2f done; base %.2f m/s, %.2f rad/s; %.2f mm, "
           "%s\n",
-          testing::PrintToString(c).c_str(), episode, result.success ? "ok" : "FAIL", result.steps,
-          q.joint_acceleration.value, q.acceleration, q.base_speed.value, q.base_turn.value,
-          1000 * q.depth, q.deepest.c_str());
+          ::testing::PrintToString(c).c_str(), episode, result.success ? "ok" : "FAIL",
+          result.steps, q.joint_acceleration.value, q.acceleration, q.base_speed.value,
+          q.base_turn.value, 1000 * q.depth, q.deepest.c_str());
   }
 }
 
@@ -153,7 +153,7 @@ const std::vector<Case> kCases{
     Case{"door_opening", "mobile_franka", "", 1, 0, 0.0015}, Case{"nav_to_obj", "rby1", "", 1},
     Case{"nav_to_obj", "mobile_franka", "", 1}};
 
-std::string name_of_case(const testing::TestParamInfo<Case>& info) {
+std::string name_of_case(const ::testing::TestParamInfo<Case>& info) {
   std::string name = std::string(info.param.task) + "_" + info.param.robot;
   for (const char* c = info.param.scene; *c; ++c) {
     if (c == info.param.scene) name += "_";
@@ -162,9 +162,9 @@ std::string name_of_case(const testing::TestParamInfo<Case>& info) {
   return name;
 }
 
-INSTANTIATE_TEST_SUITE_P(Tasks, MotionLimits, testing::ValuesIn(kCases), name_of_case);
+INSTANTIATE_TEST_SUITE_P(Tasks, MotionLimits, ::testing::ValuesIn(kCases), name_of_case);
 
-class NoisyMotion : public testing::TestWithParam<Case> {};
+class NoisyMotion : public ::testing::TestWithParam<Case> {};
 
 // With action noise the executed motion stays below the speed limit, also near singular postures.
 // MJSENSE_EPISODES=65 runs that many episodes of each task and robot, from MJSENSE_FIRST on.
@@ -177,7 +177,7 @@ TEST_P(NoisyMotion, StaysBelowTheJointSpeedLimit) {
     const MotionQuality::Greatest speed = stage.executed_speed(episode, &success);
     EXPECT_LE(speed.value, kSpeed) << said(c, episode, speed);
     if (std::getenv("MJSENSE_EPISODES")) {
-      std::printf("noise %s %d: %s, %.3f of the limit\n", testing::PrintToString(c).c_str(),
+      std::printf("noise %s %d: %s, %.3f of the limit\n", ::testing::PrintToString(c).c_str(),
                   episode, success ? "ok" : "FAIL", speed.value / kSpeed);
       std::fflush(stdout);
     }
@@ -198,7 +198,7 @@ std::vector<Case> noisy_cases() {
 
 INSTANTIATE_TEST_SUITE_P(
     Singular, NoisyMotion,
-    testing::Values(
+    ::testing::Values(
         Case{.task = "pick_and_place",
              .robot = "bimanual_yam",
              .scene = "",
@@ -207,7 +207,7 @@ INSTANTIATE_TEST_SUITE_P(
              .seed = 771000},
         Case{.task = "pick_and_place", .robot = "rby1", .scene = "", .episodes = 1, .first = 11}),
     name_of_case);
-INSTANTIATE_TEST_SUITE_P(Tasks, NoisyMotion, testing::ValuesIn(noisy_cases()), name_of_case);
+INSTANTIATE_TEST_SUITE_P(Tasks, NoisyMotion, ::testing::ValuesIn(noisy_cases()), name_of_case);
 
 }  // namespace
 }  // namespace mjsense::tasks::policies

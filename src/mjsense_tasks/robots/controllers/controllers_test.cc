@@ -13,7 +13,7 @@
 namespace mjsense::tasks::robots {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 // A robot with one move group "g"; policy, control and physics periods of 60, 6 and 2 ms.
 struct OneGroup : LoneRobot {

@@ -17,8 +17,8 @@
 namespace mjsense::tasks {
 namespace {
 
-using testing::ElementsAre;
-using testing::HasSubstr;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 
 struct Played : episode::PlayedTask<DoorOpeningTask> {
   explicit Played(const std::string& scene = "room_with_door")

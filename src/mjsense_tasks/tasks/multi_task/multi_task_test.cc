@@ -20,7 +20,7 @@
 namespace mjsense::tasks {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
 episode::TaskCfg cfg(const std::string& scene) { return episode::task_cfg("rby1", scene); }
 

@@ -16,7 +16,7 @@ constexpr double kDeg = std::numbers::pi / 180;
 
 // A camera at the origin that looks along x with z up, a vertical field of view of 60 degrees, a
 // 4:3 image, and a ball 2 m away.
-struct Sighting : testing::Test {
+struct Sighting : ::testing::Test {
   // Moves the ball to this direction: degrees to the left of and above the camera's axis.
   bool sees(double left, double up) {
     return sees_at({2, 2 * std::tan(left * kDeg), 2 * std::tan(up * kDeg)});

@@ -15,7 +15,7 @@ namespace {
 
 std::string last_part(const std::string& name) { return name.substr(name.rfind('/') + 1); }
 
-struct Nav : testing::Test, episode::PlayedTask<NavToObjTask> {
+struct Nav : ::testing::Test, episode::PlayedTask<NavToObjTask> {
   Nav() : PlayedTask(2, episode::task_cfg("rby1")) {}
   // Places the robot at a distance (m) from its target, turned away from it by `turned` (rad).
   // False if no placement is free. Facing the target, the robot must also see it.

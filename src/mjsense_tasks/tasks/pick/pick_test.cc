@@ -16,12 +16,12 @@
 namespace mjsense::tasks {
 namespace {
 
-using testing::HasSubstr;
+using ::testing::HasSubstr;
 
-episode::TaskCfg franka() { return episode::task_cfg("franka", "table"); }
+episode::TaskCfg franka_at_table() { return episode::task_cfg("franka", "table"); }
 
-struct Pick : testing::Test, episode::PlayedTask<PickTask> {
-  Pick() : PlayedTask(3, franka()) {}
+struct Pick : ::testing::Test, episode::PlayedTask<PickTask> {
+  Pick() : PlayedTask(3, franka_at_table()) {}
   int body() const { return task.objects(world.id)[0].body; }
   double* object_qpos() { return qpos_of(body()); }
 };
@@ -288,17 +288,17 @@ TEST_F(Pick, GoalIsFiveCentimetresAboveTheStart) {
 TEST_F(Pick, SensorsAreInThePublishedOrder) {
   std::vector<std::string> names;
   for (const auto& sensor : task.create_task_sensors()) names.push_back(sensor->name());
-  EXPECT_THAT(names, testing::ElementsAre("obj_start", "grasp_state_pickup_obj", "obj_end"));
+  EXPECT_THAT(names, ::testing::ElementsAre("obj_start", "grasp_state_pickup_obj", "obj_end"));
   const auto robot_sensors = task.robot().create_robot_sensors();
   ASSERT_EQ(robot_sensors.size(), 1u);
   EXPECT_EQ(robot_sensors[0]->name(), "tcp_pose");
 }
 
 TEST(Task, InvalidConfigurationsThrow) {
-  episode::TaskCfg cfg = franka();
+  episode::TaskCfg cfg = franka_at_table();
   cfg.policy_dt_ms = 65;
   EXPECT_THROW(PickTask{cfg}, ValueError);
-  cfg = franka();
+  cfg = franka_at_table();
   cfg.horizon = 0;
   EXPECT_THROW(PickTask{cfg}, ValueError);
 }

@@ -16,8 +16,8 @@
 namespace mjsense::tasks {
 namespace {
 
-using testing::HasSubstr;
-using testing::StartsWith;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 // A task whose objects a test can move.
 struct Table : episode::PlayedTask<PickAndPlaceTask> {

@@ -17,7 +17,7 @@ namespace {
 //     _______________
 //    |     tray      |
 //   =====================  table, its top at z = 0
-struct Support : testing::Test {
+struct Support : ::testing::Test {
   static constexpr const char* kModel = R"(<mujoco><worldbody>
     <body name="table" pos="0 0 -0.05"><geom type="box" size="1 1 0.05"/></body>
     <body name="tray" pos="0 0 0.01"><freejoint/><geom type="box" size="0.1 0.1 0.01" mass="0.5"/></body>
