@@ -33,12 +33,15 @@ Vec3 EnvironmentImage::direction(double x, double y) const {
           std::cos(polar)};
 }
 
-std::array<float, 3> EnvironmentImage::at(const Vec3& d) const {
-  const float azimuth = std::atan2(static_cast<float>(d[1]), static_cast<float>(d[0]));
-  const float polar = std::acos(std::clamp(static_cast<float>(d[2]), -1.0f, 1.0f));
+EnvironmentImage::Angles EnvironmentImage::angles_of(const Vec3& d) {
   const float pi = std::numbers::pi_v<float>;
-  const float x = 0.5f * (1 - azimuth / pi) * static_cast<float>(width) - 0.5f;
-  const float y = std::clamp(polar / pi * static_cast<float>(height) - 0.5f, 0.0f,
+  return {std::atan2(static_cast<float>(d[1]), static_cast<float>(d[0])) / pi,
+          std::acos(std::clamp(static_cast<float>(d[2]), -1.0f, 1.0f)) / pi};
+}
+
+std::array<float, 3> EnvironmentImage::at(Angles angles) const {
+  const float x = 0.5f * (1 - angles.azimuth) * static_cast<float>(width) - 0.5f;
+  const float y = std::clamp(angles.polar * static_cast<float>(height) - 0.5f, 0.0f,
                              static_cast<float>(height - 1));
   const float left = std::floor(x);
   const int row = static_cast<int>(y), below = std::min(row + 1, height - 1);

@@ -20,8 +20,14 @@ struct EnvironmentImage {
 
   // The direction of the point (x, y), in pixels from the left and top border.
   Vec3 direction(double x, double y) const;
+  // A direction as angles in units of pi: 0 at the centre and at the top.
+  struct Angles {
+    float azimuth, polar;
+  };
+  static Angles angles_of(const Vec3& direction);
   // Interpolated between pixels.
-  std::array<float, 3> at(const Vec3& direction) const;
+  std::array<float, 3> at(Angles angles) const;
+  std::array<float, 3> at(const Vec3& direction) const { return at(angles_of(direction)); }
   // Solid angle of each pixel of a row, sr.
   double solid_angle(int row) const;
   // Half of its size.

@@ -30,17 +30,22 @@ class Pyramid {
     while (images_.back().height > 1) images_.push_back(images_.back().halved());
   }
 
-  // The mean around the direction, over about this solid angle, sr.
-  std::array<float, 3> at(const Vec3& direction, double solid_angle) const {
+  // The level whose pixels have about this solid angle, sr.
+  double level_of(double solid_angle) const {
     const double pixel =
         4 * std::numbers::pi / (static_cast<double>(images_[0].width) * images_[0].height);
-    const double level = std::clamp(0.5 * std::log2(std::max(solid_angle / pixel, 1e-9)), 0.0,
-                                    static_cast<double>(images_.size() - 1));
+    return std::clamp(0.5 * std::log2(std::max(solid_angle / pixel, 1e-9)), 0.0,
+                      static_cast<double>(images_.size() - 1));
+  }
+
+  // The mean around the direction, of pixels of this level.
+  std::array<float, 3> at(const Vec3& direction, double level) const {
+    const EnvironmentImage::Angles angles = EnvironmentImage::angles_of(direction);
     const auto finer = static_cast<std::size_t>(level);
     const auto between = static_cast<float>(level - static_cast<double>(finer));
-    std::array<float, 3> out = images_[finer].at(direction);
+    std::array<float, 3> out = images_[finer].at(angles);
     if (between == 0) return out;
-    const std::array<float, 3> coarse = images_[finer + 1].at(direction);
+    const std::array<float, 3> coarse = images_[finer + 1].at(angles);
     for (int c = 0; c < 3; ++c) out[c] += between * (coarse[c] - out[c]);
     return out;
   }
@@ -54,7 +59,7 @@ class Pyramid {
 // directions.
 class Lobe {
  public:
-  explicit Lobe(double roughness) {
+  Lobe(double roughness, const Pyramid& radiance) : radiance_(radiance) {
     const double alpha = alpha_of(roughness);
     for (int i = 0; i < kSamples; ++i) {
       const double u = radical_inverse(i), angle = 2 * std::numbers::pi * (i + 0.5) / kSamples;
@@ -65,18 +70,18 @@ class Lobe {
       // With N = V, the density of L is D(H) (N . H) / (4 V . H) = D(H) / 4.
       samples_.push_back(
           {{2 * cosine * sine * std::cos(angle), 2 * cosine * sine * std::sin(angle), n_l},
-           4 / (kSamples * ggx(cosine, alpha))});
+           radiance.level_of(4 / (kSamples * ggx(cosine, alpha)))});
       total_ += n_l;
     }
   }
 
-  std::array<float, 3> seen(const Pyramid& radiance, const Vec3& n) const {
+  std::array<float, 3> seen(const Vec3& n) const {
     const auto [x, y] = tangents(n);
     double sum[3] = {};
-    for (const auto& [l, solid_angle] : samples_) {
+    for (const auto& [l, level] : samples_) {
       Vec3 d;
       for (int k = 0; k < 3; ++k) d[k] = l[0] * x[k] + l[1] * y[k] + l[2] * n[k];
-      const std::array<float, 3> color = radiance.at(d, solid_angle);
+      const std::array<float, 3> color = radiance_.at(d, level);
       for (int c = 0; c < 3; ++c) sum[c] += l[2] * color[c];
     }
     std::array<float, 3> out;
@@ -87,8 +92,9 @@ class Lobe {
  private:
   struct Sample {
     Vec3 l;
-    double solid_angle;
+    double level;
   };
+  const Pyramid& radiance_;
   std::vector<Sample> samples_;
   double total_ = 0;
 };
@@ -116,14 +122,14 @@ void prefilter(const EnvironmentImage& image, Environment& out) {
   ThreadPool threads(0);
   for (int level = 0; level < kLevels; ++level) {
     const int size = kFaceSizes[level];
-    const Lobe lobe(static_cast<double>(level) / (kLevels - 1));
-    const double texel = 4 * std::numbers::pi / (6.0 * size * size);
+    const Lobe lobe(static_cast<double>(level) / (kLevels - 1), radiance);
+    const double texel = radiance.level_of(4 * std::numbers::pi / (6.0 * size * size));
     threads.run(6 * size, [&](int item, int) {
       const int face = item / size, y = item % size;
       std::uint32_t* row = out.texels.data() + texture.offset[level] + item * (size + 1);
       for (int x = 0; x < size; ++x) {
         const Vec3 d = texel_direction(face, x, y, size);
-        const std::array<float, 3> color = level ? lobe.seen(radiance, d) : radiance.at(d, texel);
+        const std::array<float, 3> color = level ? lobe.seen(d) : radiance.at(d, texel);
         row[x] = pack_rgb9e5(color.data());
       }
       row[size] = row[size - 1];
