@@ -128,7 +128,7 @@ def test_one_side_of_an_image_keeps_the_aspect_ratio(given, shape):
 
 
 def test_misspelt_options():
-    with pytest.raises(TypeError, match=r"make_vec\(\) got an unexpected keyword argument 'camera'; did you mean 'cameras'"):
+    with pytest.raises(TypeError, match=r"make\(\) got an unexpected keyword argument 'camera'; did you mean 'cameras'"):
         mjs.make("pick", camera=[])
     with pytest.raises(TypeError, match=r"record\(\) got an unexpected keyword argument 'episode'; did you mean 'episodes'"):
         mjs.record("pick", out="x", episode=3)

@@ -59,7 +59,7 @@ CASES = {
     "terrain": (lambda u: mjs.TerrainCfg(dificulty=1), ["TerrainCfg()", "'dificulty'", "'difficulty'"]),
     "entity": (lambda u: mjs.EntityCfg(modle=XML), ["EntityCfg()", "'modle'", "did you mean 'model'?"]),
     "make_vec": (lambda u: mjs.make_vec("pick", num_env=2), ["make_vec()", "'num_env'", "did you mean 'num_envs'?"]),
-    "make": (lambda u: mjs.make("pick", camera=[]), ["make_vec()", "'camera'", "'cameras'"]),
+    "make": (lambda u: mjs.make("pick", camera=[]), ["make()", "'camera'", "'cameras'"]),
     "record": (lambda u: mjs.record("pick", out="x", episode=2), ["record()", "'episode'", "'episodes'"]),
     "Renderer": (lambda u: mjs.Renderer(u.model, heigth=3), ["Renderer()", "'heigth'", "did you mean 'height'?"]),
     "Dataset": (lambda u: mjs.Dataset("x", delta_timestamp={}), ["Dataset()", "'delta_timestamp'", "'delta_timestamps'"]),
@@ -264,7 +264,7 @@ CASES = {
     ),
     "expert without a policy": (lambda u: u.env.expert_action(), ["expert_action()", "no policy", "policy='planner'"]),
     "name of gymnasium": (lambda u: gymnasium.make("mjsense/Pik-v0"), ["Pik", "mjsense", "Did you mean: `Pick`?"]),
-    "option of gymnasium": (lambda u: gymnasium.make("mjsense/Pick-v0", camras=[]), ["make_vec()", "'camras'", "did you mean 'cameras'"]),
+    "option of gymnasium": (lambda u: gymnasium.make("mjsense/Pick-v0", camras=[]), ["make()", "'camras'", "did you mean 'cameras'"]),
     # making recordings
     "no folder": (lambda u: mjs.record("pick"), ["record()", "missing", "'out'"]),
     "format": (lambda u: mjs.record("pick", out=u.tmp / "q", format="lerobt"), ["unknown export format 'lerobt'", "did you mean 'lerobot'"]),

@@ -178,6 +178,17 @@ def checked(target: T, owner: str = "", context: str = "") -> T:
     return cast(T, call)
 
 
+def check_options(context: str, options: dict[str, Any], function: Any) -> None:
+    """Checks keyword arguments that a function, such as ``make()``, passes on to another one. Messages begin with ``context``."""
+    parameters = inspect.signature(function).parameters
+    for name, value in options.items():
+        if name not in parameters:
+            raise unexpected_keyword(context, name, parameters)
+        check = _check_of(context, name, parameters[name].annotation)
+        if check is not None:
+            check(value)
+
+
 class KnownAttributes:
     """Makes assignment to an unknown attribute an error: ``sim.qposs = 3``. Subclasses may add attributes."""
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from gymnasium.vector import AutoresetMode
 
-from mjsense.core.arguments import Seed, checked
+from mjsense.core.arguments import Seed, check_options, checked
 from mjsense.core.later_rooms import provided
 from mjsense.tasks.env import TaskEnv
 from mjsense.tasks.parts import Policies, Robots, Scenes, Tasks, parts_of
@@ -210,4 +210,5 @@ def make(task: Tasks = "pick", robot: Robots | None = None, **options: Any) -> T
     for word in ("num_envs", "autoreset_mode"):
         if word in options:
             raise TypeError(f"make() has no {word}: that is make_vec()'s")
+    check_options("make()", options, make_vec)
     return TaskEnv(make_vec(task, robot, num_envs=1, autoreset_mode="disabled", **options))

@@ -204,7 +204,7 @@ inline Float hidden_by_plane(const ViewGeom& g, Vec3f p, Vec3f n, float reach) {
   return select(over, below * fade(local.z * local.z, reach), splat(0.0f));
 }
 
-// The least of three half sizes. Not std::min(), which would be an instance for this kernel's instruction set.
+// The smallest of three half sizes. Not std::min(), which would be an instance for this kernel's instruction set.
 inline float thinnest(const float* half) {
   const float two = half[0] < half[1] ? half[0] : half[1];
   return two < half[2] ? two : half[2];
