@@ -3,8 +3,8 @@
 """Checks C++ files with clang's front end, using the compile commands of a GCC build. Finds errors and warnings that GCC does not
 report.
 
-usage: tools/other_compiler.py BUILD [FILE ...]     without files: all of src/, in the groups of cmake/UnityBuild.cmake if BUILD
-    has them
+usage: tools/other_compiler.py BUILD [FILE ...]     without files: all of src/ and python/bindings/, in the groups of
+    cmake/UnityBuild.cmake
 """
 
 from __future__ import annotations
@@ -46,7 +46,12 @@ def main(arguments: list[str]) -> int:
     entries = [
         entry
         for entry in json.loads(Path(arguments[0], "compile_commands.json").read_text())
-        if (entry["file"] in wanted if wanted else Path(entry["file"]).is_relative_to(ROOT / "src") or "/Unity/" in entry["file"])
+        if (
+            entry["file"] in wanted
+            if wanted
+            else "/Unity/" in entry["file"]
+            or any(map(Path(entry["file"]).is_relative_to, (ROOT / "src", ROOT / "python/bindings")))
+        )
     ]
 
     def check(entry: dict[str, str]) -> bool:

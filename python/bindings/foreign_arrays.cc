@@ -109,7 +109,7 @@ class PyForeignArrays {
   }
 
  private:
-  const ProcessGuard process_;
+  const ProcessGuard process_{};
   std::mutex mutex_;
   std::shared_ptr<worlds::ForeignArrays> arrays_;
   std::shared_ptr<rays::ForeignRays> rays_;

@@ -75,7 +75,7 @@ class SimulationLock {
     ~Depth() { --depth; }
     int& depth;
   };
-  const ProcessGuard process_;
+  const ProcessGuard process_{};
   std::recursive_mutex mutex_;
   int depth_ = 0;
 };

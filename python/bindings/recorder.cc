@@ -155,7 +155,7 @@ class PyRecorder {
   int num_worlds_;
   std::vector<std::shared_ptr<Sensor>> sources_;  // sensors to refresh
   std::vector<std::shared_ptr<Sensor>> sensors_;  // sensors to store
-  const ProcessGuard process_;
+  const ProcessGuard process_{};
   std::shared_ptr<record::Recorder> recorder_;
 };
 
