@@ -119,7 +119,7 @@ def videos_with(tmp_path_factory):
         key = json.dumps(options, sort_keys=True)
         if key not in made:
             out = tmp_path_factory.mktemp("short")
-            mjs.record("pick", out=out, **{**RECORDING, "episodes": 1, "horizon": 3, **options})
+            mjs.record("pick", out=out, cameras=["wrist_camera"], **{**RECORDING, "episodes": 1, "horizon": 3, **options})
             made[key] = out, videos(out)
         return made[key]
 
