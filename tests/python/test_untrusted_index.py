@@ -82,7 +82,8 @@ def test_a_path_is_that_of_a_file_of_the_recording(root, tmp_path, path):
     [({"trajectory": "../x"}, "trajectory is '../x'"), ({"trajectory": "traj_007"}, "trajectory is 'traj_007'"), ({"length": -1}, "length is -1"),
      ({"length": 10**12}, "length is 1000000000000"), ({"episode": -1}, "episode is -1"), ({"seed": "x"}, "the column 'seed' is string"),
      ({"length": None}, "the column 'length' is null"), ({"outcome": "x" * 100_000}, "has a text of more than 65536 characters"),
-     ({"path": b"x"}, "the column 'path' is binary")],
+     ({"path": b"x"}, "the column 'path' is binary"), ({"outcome": ["x"]}, "the column 'outcome' is list<"),
+     ({"length": [3]}, "the column 'length' is list<")],
 )  # fmt: skip
 def test_values_of_an_index(root, change, text):
     (root / "index.parquet").write_bytes(index_of([{**ROW, **change}]))

@@ -55,7 +55,8 @@ def rows_of(path: Path) -> list[dict[str, Any]]:
 
 
 def _check_columns(path: Path, schema: Any) -> None:
-    types = {field.name: str(getattr(field.type, "value_type", field.type)) for field in schema}
+    # Lists have a value_type too.
+    types = {field.name: str(field.type.value_type if hasattr(field.type, "index_type") else field.type) for field in schema}
     expected = {**dict.fromkeys(_TEXTS, ("string",)), **dict.fromkeys(_NUMBERS, ("int64", "uint64")), "success": ("bool",)}
     for name, kinds in expected.items():
         if types.get(name) not in kinds:
