@@ -178,12 +178,18 @@ def checked(target: T, owner: str = "", context: str = "") -> T:
     return cast(T, call)
 
 
-def check_options(context: str, options: dict[str, Any], function: Any) -> None:
-    """Checks keyword arguments that a function, such as ``make()``, passes on to another one. Messages begin with ``context``."""
+def check_options(context: str, options: dict[str, Any], function: Any, without: tuple[str, ...]) -> None:
+    """Checks keyword arguments that a function, such as ``make()``, passes on to another one. Messages begin with ``context``.
+
+    Args:
+        without: Arguments that only the other function has.
+    """
     parameters = inspect.signature(function).parameters
     for name, value in options.items():
+        if name in without:
+            raise TypeError(f"{context} has no {name}: that is {function.__name__}()'s")
         if name not in parameters:
-            raise unexpected_keyword(context, name, parameters)
+            raise unexpected_keyword(context, name, [one for one in parameters if one not in without])
         check = _check_of(context, name, parameters[name].annotation)
         if check is not None:
             check(value)

@@ -207,8 +207,5 @@ def make_vec(
 def make(task: Tasks = "pick", robot: Robots | None = None, **options: Any) -> TaskEnv:
     """Creates a gymnasium environment of a task with one world. The options are those of :func:`make_vec` except ``num_envs`` and
     ``autoreset_mode``: call ``reset()`` after the end of an episode."""
-    for word in ("num_envs", "autoreset_mode"):
-        if word in options:
-            raise TypeError(f"make() has no {word}: that is make_vec()'s")
-    check_options("make()", options, make_vec)
+    check_options("make()", options, make_vec, without=("num_envs", "autoreset_mode"))
     return TaskEnv(make_vec(task, robot, num_envs=1, autoreset_mode="disabled", **options))

@@ -198,8 +198,8 @@ int skybox_of(const mjModel* m) {
   return -1;
 }
 
-// By the content of a texture or a file. Preparing one takes 0.5 s of CPU time, and it has 2 MB: the last ones
-// are there for the next recording or renderer of this process.
+// By the content of a texture or a file. The last four stay for later recordings and renderers of the process, because preparing
+// one takes tenths of a second; each has 2 MB.
 ContentCache<Environment>& prepared_sources() {
   static ContentCache<Environment> all(4);
   return all;

@@ -17,6 +17,7 @@
 #include "mjsense/scene/scene.h"
 #include "mjsense/sensors/lidar/npy.h"
 #include "mjsense/sensors/lidar/point_cloud.h"
+#include "mjsense/sensors/testing/lab.h"
 #include "mjsense/sim/simulation.h"
 
 namespace mjsense::sensors {
@@ -35,10 +36,8 @@ constexpr char kRoom[] = R"(
     <geom size=".05" mass="1" group="2"/><site name="lidar"/></body>
 </worldbody></mujoco>)";
 
-struct LidarLab {
+struct LidarLab : testing::Lab {
   std::shared_ptr<LidarSensorCfg> cfg = std::make_shared<LidarSensorCfg>();
-  std::shared_ptr<scene::Scene> scene;
-  std::unique_ptr<sim::Simulation> sim;
 
   LidarLab() {
     cfg->name = "lidar";
@@ -47,19 +46,11 @@ struct LidarLab {
     cfg->scan = SpinningScan{.channels = 4, .samples = 90};
   }
   void start(sim::SimulationCfg sim_cfg = {}) {
-    scene::SceneCfg s;
-    s.entities.emplace_back("r", scene::EntityCfg{.model = {.xml = kRoom}});
+    scene::SceneCfg s = scene_of("r", kRoom, {cfg});
     s.options.gravity = {0, 0, 0};
-    s.sensors = {cfg};
-    scene = std::make_shared<scene::Scene>(std::move(s));
-    sim = std::make_unique<sim::Simulation>(scene, sim_cfg);
+    Lab::operator=(Lab(std::move(s), sim_cfg));
   }
-  std::vector<float> read(std::string_view field) {
-    Sensor& sensor = scene->sensor("lidar");
-    sim->refresh(sensor);
-    const auto all = sensor.field(field).data.all<float>();
-    return {all.begin(), all.end()};
-  }
+  std::vector<float> read(std::string_view field) { return Lab::read(field, "lidar"); }
   void set(const char* component, int i, double value) {
     const ArrayView v = sim->worlds().state_component(component);
     reinterpret_cast<double*>(v.data)[i] = value;

@@ -23,6 +23,7 @@ using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::FloatNear;
 using ::testing::HasSubstr;
+using testing::kOnItsSide;
 using ::testing::Pointwise;
 
 // A floor, a step 0.5 m high for x > 0.5, a floating base with a child body below it, and geoms in
@@ -45,8 +46,6 @@ constexpr char kRobot[] = R"(
     </body>
   </worldbody>
 </mujoco>)";
-
-constexpr double kOnItsSide = 0.70710678118654752;  // w and x of a rotation by 90 degrees about x
 
 template <class Cfg>
 std::shared_ptr<Cfg> sensor_cfg(std::string name = "ray") {

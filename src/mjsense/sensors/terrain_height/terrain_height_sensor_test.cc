@@ -35,8 +35,6 @@ constexpr char kField[] = R"(
   </body>
 </worldbody></mujoco>)";
 
-constexpr double kHalfRoot = 0.70710678118654752;  // w and x of a rotation by 90 degrees about x
-
 std::shared_ptr<TerrainHeightSensorCfg> height(HeightReduction reduction = HeightReduction::kMin) {
   auto cfg = std::make_shared<TerrainHeightSensorCfg>();
   cfg->name = "height";
@@ -53,7 +51,7 @@ struct HeightLab : testing::Lab {
 
   // Heights when the foot is at (x, 0, z), on its side.
   std::vector<float> at(double x, double z) {
-    pose({x, 0, z, kHalfRoot, kHalfRoot, 0, 0});
+    pose({x, 0, z, testing::kOnItsSide, testing::kOnItsSide, 0, 0});
     return read("heights", "height", 0);
   }
 };

@@ -18,10 +18,13 @@
 
 namespace mjsense::testing {
 
+constexpr double kOnItsSide = 0.70710678118654752;  // w and x of a rotation by 90 degrees about x
+
 struct Lab {
   std::shared_ptr<scene::Scene> scene;
   std::unique_ptr<sim::Simulation> sim;
 
+  Lab() = default;
   explicit Lab(scene::SceneCfg s, sim::SimulationCfg cfg = {})
       : scene(std::make_shared<scene::Scene>(std::move(s))),
         sim(std::make_unique<sim::Simulation>(scene, cfg)) {}
