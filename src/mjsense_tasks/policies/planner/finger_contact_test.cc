@@ -52,5 +52,24 @@ TEST(FingerContact, SlopeIsInfiniteForOneRowOfPoints) {
   EXPECT_TRUE(std::isinf(s.slope));
 }
 
+TEST(FingerContact, ThePointsBetweenThePlanesOfThePadsGiveTheSameBits) {
+  const std::vector<Vec3> points = bar();
+  std::vector<Vec3> some;
+  for (int k = 0; k < 24; ++k) {
+    const double a = 2 * std::numbers::pi * k / 24, along = 0.001 * (k - 12);
+    const Vec3 approach{0, std::sin(a), -std::cos(a)}, close{0, std::cos(a), std::sin(a)};
+    points_between(points, approach, along - kHalfLength, along + kHalfLength, some);
+    EXPECT_LT(some.size(), points.size());
+    FingerContact of[2];
+    for (int i = 0; i < 2; ++i)
+      of[i] = measure_finger_contact(i == 0 ? points : some, along * approach, close, {1, 0, 0},
+                                     approach, kHalfWidth, kHalfLength);
+    EXPECT_EQ(of[0].low, of[1].low) << k;
+    EXPECT_EQ(of[0].high, of[1].high) << k;
+    EXPECT_EQ(of[0].face, of[1].face) << k;
+    EXPECT_EQ(of[0].slope, of[1].slope) << k;
+  }
+}
+
 }  // namespace
 }  // namespace mjsense::tasks::policies
