@@ -186,9 +186,7 @@ def check_options(context: str, options: dict[str, Any], function: Any, without:
     """
     parameters = inspect.signature(function).parameters
     for name, value in options.items():
-        if name in without:
-            raise TypeError(f"{context} has no {name}: that is {function.__name__}()'s")
-        if name not in parameters:
+        if name not in parameters or name in without:
             raise unexpected_keyword(context, name, [one for one in parameters if one not in without])
         check = _check_of(context, name, parameters[name].annotation)
         if check is not None:

@@ -207,5 +207,9 @@ def make_vec(
 def make(task: Tasks = "pick", robot: Robots | None = None, **options: Any) -> TaskEnv:
     """Creates a gymnasium environment of a task with one world. The options are those of :func:`make_vec` except ``num_envs`` and
     ``autoreset_mode``: call ``reset()`` after the end of an episode."""
-    check_options("make()", options, make_vec, without=("num_envs", "autoreset_mode"))
+    of_many_worlds = ("num_envs", "autoreset_mode")
+    for name in of_many_worlds:
+        if name in options:
+            raise TypeError(f"make() has no {name}: that is make_vec()'s")
+    check_options("make()", options, make_vec, without=of_many_worlds)
     return TaskEnv(make_vec(task, robot, num_envs=1, autoreset_mode="disabled", **options))
