@@ -20,15 +20,25 @@ struct Occluders {
   bool moving = false;  // some are not fixed
 };
 
-// A sphere around points, and the greatest distance of their unit normals from one of them.
+// A sphere around points, by how much they are below the surface at its center, and the greatest distance
+// of their unit normals from the one there.
 struct Patch {
-  float center[3], radius, normal[3], bend;
+  float center[3], radius, normal[3], depth, bend;
 };
 
-// Which of kWidth boxes, from number i on, may hide the environment from the points of a patch. With
-// `horizon` boxes are left out that are below the surface's horizon at all points.
+// What hides a smaller part of the environment is left out.
+constexpr float kLeastHidden = 1.0f / 256;
+
+// 1 at the geom and 0 where the square of the distance times `scale` is 1 or more.
+inline Float fade(Float square, Float scale) {
+  const Float left = max(fma(-square, scale, splat(1.0f)), splat(0.0f));
+  return left * left;
+}
+
+// Which of kWidth occluders, from number i on, may hide at least kLeastHidden from one of the points of a
+// patch. With `horizon` those are left out that are too low above the surface at all points.
 template <bool horizon>
-std::uint32_t boxes_near(const OccluderBoxes& boxes, int i, const Patch& patch) {
+std::uint32_t occluders_near(const OccluderBoxes& boxes, int i, const Patch& patch) {
   using Boxes = OccluderBoxes;
   const auto row = [&](int k) { return loadu(boxes.row(k) + i); };
   const auto turned = [&](const float* v, int k) {
@@ -48,13 +58,21 @@ std::uint32_t boxes_near(const OccluderBoxes& boxes, int i, const Patch& patch) 
       size = size + half;
     }
   }
-  const Float far = row(Boxes::kReach) + splat(patch.radius);
-  const Mask near = (splat(0.0f) < far) & (square < far * far);
-  if constexpr (!horizon) return bits(near);
-  // By how much it may be higher at other points. Planes, which have no height, are always kept.
-  const Float more = fma(splat(patch.bend), fma(splat(2.0f), size, far + splat(patch.radius)),
-                         splat(patch.radius));
-  return bits(near & ~((top + more < splat(0.0f)) & (splat(0.0f) < row(Boxes::kHalf + 2))));
+  // Bounds for all points: the distance, and the height above the horizon. What is seen at a height h in a
+  // distance d or more counts at most h / d.
+  const Float center = sqrt(square), area = row(Boxes::kArea);
+  const Float d = max(center - splat(patch.radius), splat(1e-6f));
+  const Float gap = max(d - row(Boxes::kRadius), splat(0.0f));
+  Float height = d;
+  if constexpr (horizon) {
+    const Float other = center + splat(patch.radius);  // the greatest distance
+    const Float more =
+        fma(splat(patch.bend), fma(splat(2.0f), size, other), splat(patch.depth + 1e-5f));
+    // Planes, which have no height, are kept.
+    height = select(area < splat(kEndless), min(d, top + more), d);
+  }
+  const Float most = height * area * fade(gap * gap, row(Boxes::kFade));
+  return bits(splat(0.98f * kLeastHidden) * d * d * d < most);
 }
 
 // Finds those of `part` for points between `low` and `high`, in the memory of `scratch`.
@@ -71,7 +89,8 @@ inline void find_occluders(const View& view, Part part, const float* low, const 
   }
   patch.radius = std::sqrt(square);
   for (int i = 0; i < view.num_geoms; i += kWidth) {
-    for (std::uint32_t near = boxes_near<false>(view.occluders, i, patch); near; near &= near - 1) {
+    for (std::uint32_t near = occluders_near<false>(view.occluders, i, patch); near;
+         near &= near - 1) {
       const int g = i + __builtin_ctz(near);
       if (g >= view.num_geoms) return;
       if (!belongs(view.geoms[g], part)) continue;
@@ -103,8 +122,7 @@ inline Float relative_arc(Float cosine, Float square_sine) {
 // every axis: only the three faces there can face it. Index 0 is the nearer end of an axis, 1 the other.
 class SeenBox {
  public:
-  SeenBox(const float* half, Vec3f p, Vec3f n) : half_(half) {
-    const Float at[3] = {p.x, p.y, p.z}, normal[3] = {n.x, n.y, n.z};
+  SeenBox(const float* half, const Float* at, const Float* normal) : half_(half) {
     for (int axis = 0; axis < 3; ++axis) {
       const Float away = abs(at[axis]);
       faces_[axis] = splat(half[axis]) < away;
@@ -179,64 +197,49 @@ class SeenBox {
   Float normal_[3], v_[3][2], square_[3][2], scale_[2][2][2];
 };
 
-// 1 at the geom and 0 at the distance `reach` (m) or more, of which `square` is the square.
-inline Float fade(Float square, float reach) {
-  const Float left = max(splat(1.0f) - square * splat(1 / (reach * reach)), splat(0.0f));
-  return left * left;
-}
-
-// Part of the hemisphere around n that the sphere at `to` (from the point) hides.
-inline Float hidden_by_sphere(Vec3f to, float radius, Vec3f n, float reach) {
-  const Float zero = splat(0.0f), one = splat(1.0f);
-  const Float square = max(dot(to, to), splat(1e-12f));
-  const Float closeness = inverse_sqrt(square);
-  const Float away = max(fma(square, closeness, splat(-radius)), zero);
-  const Float size = min(splat(radius) * closeness, one);
-  return max(dot(to, n) * closeness, zero) * size * size * fade(away * away, reach);
-}
-
-inline Float hidden_by_plane(const ViewGeom& g, Vec3f p, Vec3f n, float reach) {
-  const Vec3f local = to_geom(g.rot, p - splat(g.pos));
-  Mask over = splat(0.0f) < local.z;
-  if (g.size[0] > 0) over = over & (abs(local.x) < splat(g.size[0]));
-  if (g.size[1] > 0) over = over & (abs(local.y) < splat(g.size[1]));
-  const Float below = fma(to_geom(g.rot, n).z, splat(-0.5f), splat(0.5f));
-  return select(over, below * fade(local.z * local.z, reach), splat(0.0f));
-}
-
-// The smallest of three half sizes. Not std::min(), which would be an instance for this kernel's instruction set.
-inline float thinnest(const float* half) {
-  const float two = half[0] < half[1] ? half[0] : half[1];
-  return two < half[2] ? two : half[2];
-}
-
-// Part of the hemisphere around n that a geom other than a plane hides from p. Boxes are exact; others are
-// spheres swept in a box, as wide as the geom is along its thinnest axis.
-inline Float hidden_by_solid(const ViewGeom& g, Mask lanes, Vec3f p, Vec3f n, float reach) {
-  const Float zero = splat(0.0f);
-  const float* half = g.aabb + 3;
-  const bool box = g.type == mjGEOM_BOX;
-  const float thick = box ? 0.0f : thinnest(half);
-  const float swept[3] = {half[0] - thick, half[1] - thick, half[2] - thick};
-  const Vec3f to_center = splat(g.center) - p, normal = to_geom(g.rot, n);
-  // Height of what is swept above the surface's horizon.
-  const Float top =
-      dot(to_center, n) + fma(abs(normal.x), splat(swept[0]),
-                              fma(abs(normal.y), splat(swept[1]), abs(normal.z) * splat(swept[2])));
-  const Mask over = lanes & (splat(1e-5f) < top);
-  if (!any(over)) return zero;
-  const Vec3f center = to_geom(g.rot, to_center);
-  const auto beyond = [](Float x, float h) { return x - min(max(x, splat(-h)), splat(h)); };
-  const Vec3f to{beyond(center.x, swept[0]), beyond(center.y, swept[1]),
-                 beyond(center.z, swept[2])};
-  if (!box) return select(over, hidden_by_sphere(to, thick, normal, reach), zero);
-  const Float near = fade(dot(to, to), reach);
-  // What hides less than 1/500 is left out. A sphere around the box hides at most (radius / distance)^2.
-  const Mask some =
-      over & (splat(0.002f) * dot(center, center) < near * splat(g.radius * g.radius));
-  if (!any(some)) return zero;
-  const Vec3f at{-center.x, -center.y, -center.z};
-  return select(some, SeenBox(half, at, normal).hidden() * near, zero);
+// Part of the hemisphere around n that an occluder hides from p. Boxes are exact. Planes hide what is above
+// them, and others are spheres, as near as they come.
+inline Float hidden_by(const OccluderBoxes& boxes, int i, int type, Mask lanes, Vec3f p, Vec3f n) {
+  using Boxes = OccluderBoxes;
+  const auto value = [&](int k) { return splat(boxes.row(k)[i]); };
+  const auto turned = [&](Vec3f v, int k) {
+    return fma(value(Boxes::kRotation + k), v.x,
+               fma(value(Boxes::kRotation + 3 + k), v.y, value(Boxes::kRotation + 6 + k) * v.z));
+  };
+  const Float zero = splat(0.0f), one = splat(1.0f), half = splat(0.5f);
+  Float local[3], normal[3], away[3];  // `away`: from the nearest point of the box
+  for (int k = 0; k < 3; ++k) {
+    local[k] = turned(p, k) + value(Boxes::kOrigin + k);
+    normal[k] = turned(n, k);
+    away[k] = local[k] - min(max(local[k], -value(Boxes::kHalf + k)), value(Boxes::kHalf + k));
+  }
+  const Float square = fma(away[0], away[0], fma(away[1], away[1], away[2] * away[2]));
+  const Float scale = value(Boxes::kFade);
+  if (type == mjGEOM_PLANE) {
+    const Mask over = lanes & (zero < away[2]) & (max(abs(away[0]), abs(away[1])) < splat(1e-6f));
+    return select(over, fma(normal[2], -half, half) * fade(square, scale), zero);
+  }
+  Float hidden;
+  if (type == mjGEOM_BOX) {
+    const float sizes[3] = {boxes.row(Boxes::kHalf)[i], boxes.row(Boxes::kHalf + 1)[i],
+                            boxes.row(Boxes::kHalf + 2)[i]};
+    const Float near = fade(square, scale), d = sqrt(square);
+    Float top = zero;
+    for (int k = 0; k < 3; ++k)
+      top = top + fma(abs(normal[k]), value(Boxes::kHalf + k), -(normal[k] * local[k]));
+    const Mask some = lanes & (splat(kLeastHidden) * d * d * d <
+                               min(top, d + splat(1e-6f)) * value(Boxes::kArea) * near);
+    if (!any(some)) return zero;
+    hidden = SeenBox(sizes, local, normal).hidden() * near;
+  } else {
+    const Float radius = value(Boxes::kRadius);
+    const Float closeness = inverse_sqrt(max(square, splat(1e-12f)));
+    const Float gap = max(fma(square, closeness, -radius), zero);
+    const Float size = min(radius * closeness, one);
+    const Float along = fma(away[0], normal[0], fma(away[1], normal[1], away[2] * normal[2]));
+    hidden = max(-along * closeness, zero) * size * size * fade(gap * gap, scale);
+  }
+  return select(lanes, max(hidden - splat(kLeastHidden), zero), zero);
 }
 
 inline Patch patch_of(const Surfaces& s, std::uint32_t lanes) {
@@ -246,14 +249,16 @@ inline Patch patch_of(const Surfaces& s, std::uint32_t lanes) {
     out.center[c] = s.p[c][first];
     out.normal[c] = s.n[c][first];
   }
-  Float away = splat(0.0f), bend = splat(0.0f);
+  Float away = splat(0.0f), depth = splat(0.0f), bend = splat(0.0f);
   for (int k = 0; k < kLanes; k += kWidth) {
     const Vec3f p = load3(s.p, k) - splat(out.center), n = load3(s.n, k) - splat(out.normal);
     const Mask those = mask_of(lanes >> k & kAllLanes);
     away = max(away, select(those, dot(p, p), splat(0.0f)));
+    depth = max(depth, select(those, -dot(p, splat(out.normal)), splat(0.0f)));
     bend = max(bend, select(those, dot(n, n), splat(0.0f)));
   }
   out.radius = std::sqrt(lane_max(away));
+  out.depth = lane_max(depth);
   out.bend = std::sqrt(lane_max(bend));
   return out;
 }
@@ -265,18 +270,15 @@ inline void open_sky(const View& view, const Occluders& tile, const Surfaces& s,
   if (!lanes) return;
   const Patch patch = patch_of(s, lanes);
   for (int first = 0; first < tile.count; first += kWidth) {
-    for (std::uint32_t near = boxes_near<true>(tile.boxes, first, patch); near; near &= near - 1) {
+    for (std::uint32_t near = occluders_near<true>(tile.boxes, first, patch); near;
+         near &= near - 1) {
       const int i = first + __builtin_ctz(near);
       if (i >= tile.count) return;
-      const ViewGeom& g = view.geoms[tile.list[i]];
-      const float reach = tile.boxes.row(OccluderBoxes::kReach)[i];
+      const int g = tile.list[i], type = view.geoms[g].type;
       for (int k = 0; k < kLanes; k += kWidth) {
-        const Vec3f p = load3(s.p, k), n = load3(s.n, k);
-        const Mask other =
-            mask_of(lanes >> k & kAllLanes) & ~(load(hits.geom + k) == int_of(tile.list[i]));
-        const Float hidden = g.type == mjGEOM_PLANE
-                                 ? select(other, hidden_by_plane(g, p, n, reach), splat(0.0f))
-                                 : hidden_by_solid(g, other, p, n, reach);
+        const Mask other = mask_of(lanes >> k & kAllLanes) & ~(load(hits.geom + k) == int_of(g));
+        if (!any(other)) continue;
+        const Float hidden = hidden_by(tile.boxes, i, type, other, load3(s.p, k), load3(s.n, k));
         store(out + k, load(out + k) * (splat(1.0f) - min(hidden, splat(1.0f))));
       }
     }

@@ -57,11 +57,15 @@ struct PhysicalView {
   bool operator==(const PhysicalView&) const = default;
 };
 
-// Boxes around geoms, and the distance from its box up to which each hides the environment, m; negative:
-// it hides nothing. Rows of values by geom, with kWindowPadding more entries that kernels may read.
+// The geoms that hide the environment, as boxes and as spheres swept in a box. Rows of values by geom, with
+// kWindowPadding more entries that kernels may read.
 struct OccluderBoxes {
-  // R_CB, row-major, -R_CB^T p_CB, half sizes and the distance; C is the camera's frame, B the box's.
-  static constexpr int kRotation = 0, kOrigin = 9, kHalf = 12, kReach = 15, kRows = 16;
+  // R_CB, row-major, -R_CB^T p_CB and half sizes; C is the camera's frame, B the box's.
+  static constexpr int kRotation = 0, kOrigin = 9, kHalf = 12;
+  // Radius of the sphere (0: a box), 1 / the square of the distance from the surface up to which the geom
+  // hides the environment, and a bound: at a distance d from the box it hides at most area / d^2 of the
+  // hemisphere (0: nothing).
+  static constexpr int kRadius = 15, kFade = 16, kArea = 17, kRows = 18;
   float* values = nullptr;
   std::size_t stride = 0;
 

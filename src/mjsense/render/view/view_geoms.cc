@@ -2,6 +2,7 @@
 #include "mjsense/render/view/view_geoms.h"
 
 #include <algorithm>
+#include <numbers>
 
 #include "mjsense/render/view/light_frame.h"
 
@@ -53,15 +54,22 @@ void ViewGeoms::set_occluders(View& view) {
   const auto set = [&](int row, int i, float value) { view.occluders.row(row)[i] = value; };
   for (int i = 0; i < view.num_geoms; ++i) {
     const ViewGeom& g = sorted_[i];
-    const bool plane = g.type == mjGEOM_PLANE;
+    const bool plane = g.type == mjGEOM_PLANE, box = g.type == mjGEOM_BOX;
+    const float* half = g.aabb + 3;
+    const float radius = plane || box ? 0 : std::min({half[0], half[1], half[2]});
     for (int k = 0; k < 9; ++k) set(Boxes::kRotation + k, i, g.rot[k]);
     for (int k = 0; k < 3; ++k) {
       const float side = k == 2 ? 0 : g.size[k] > 0 ? g.size[k] : kEndless;  // of a plane
       set(Boxes::kOrigin + k, i, g.eye[k] - (plane ? 0 : g.aabb[k]));
-      set(Boxes::kHalf + k, i, plane ? side : g.aabb[3 + k]);
+      set(Boxes::kHalf + k, i, plane ? side : half[k] - radius);
     }
-    set(Boxes::kReach, i,
-        hides_environment(g) ? hiding_reach(g, view.physical.occlusion_reach) : -kEndless);
+    set(Boxes::kRadius, i, radius);
+    const float reach = hiding_reach(g, view.physical.occlusion_reach);
+    set(Boxes::kFade, i, 1 / (reach * reach));
+    // At most three faces of a box are seen. The cosines of a hemisphere have the integral pi.
+    const float faces = 4 * (half[0] * half[1] + half[1] * half[2] + half[2] * half[0]);
+    const float area = plane ? kEndless : box ? faces / std::numbers::pi_v<float> : radius * radius;
+    set(Boxes::kArea, i, hides_environment(g) ? area : 0);
   }
 }
 
