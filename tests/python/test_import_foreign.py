@@ -314,6 +314,7 @@ def image_bytes(content):
 @pytest.mark.parametrize("change, message", [
     (info_value("data_path", "/tmp/x.parquet"), "data_path: is '/tmp/x.parquet', expected the name of a file inside"),
     (info_value("data_path", "../x.parquet"), "expected the name of a file inside"), (info_value("data_path", 5), "data_path: is 5, expected a text"),
+    (info_value("data_path", "\ud800"), r"data_path: is '\\ud800', which has half of a surrogate pair, expected Unicode text"),
     (info_value("data_path", "data/{chunk_index.__class__.__mro__}"), "expected fields such as"), (info_value("data_path", "{chunk_index:2000000000d}"), "expected fields such as"),
     (info_value("data_path", "{nothing}"), "expected only the fields chunk_index, file_index"), (info_value("video_path", "/dev/zero"), "expected the name of a file inside"),
     (info_value("fps", "1e999999999"), "fps: is '1e999999999', expected a number"), (info_value("fps", 0), "fps: is 0"), (info_value("fps", 1e300), "fps: is 1e"),
@@ -330,7 +331,7 @@ def image_bytes(content):
     (image_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\1\0\0\0\1\0\0"), "images of 65536 x 65536 pixels"),
     (large_images, "one observation has more than 536870912 bytes"), (image_bytes(png_with_texts()), "its texts may unpack to .* bytes, the limit is"),
     (row_value("episode_index", ["0"] * 6), "has no column episode_index of whole numbers"), (row_value("action", [b"x" * 20] * 6), "row 0 is b'xxx"),
-], ids=range(36))  # fmt: skip
+], ids=range(37))  # fmt: skip
 def test_values_of_data_sets(video, tmp_path, change, message):
     root = lerobot(tmp_path / "set", video, change)
     with pytest.raises(ValueError, match=message) as error:

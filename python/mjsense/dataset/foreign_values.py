@@ -41,6 +41,8 @@ def mapping(value: Any, about: str) -> dict[str, Any]:
 def text(value: Any, about: str, limit: int = 10_000) -> str:
     if not isinstance(value, str) or len(value) > limit:
         raise ValueError(f"{about}: is {found(value)}, expected a text of at most {limit} characters")
+    if re.search("[\ud800-\udfff]", value):  # JSON can contain them, and no file name, HDF5 file or web page can
+        raise ValueError(f"{about}: is {found(value)}, which has half of a surrogate pair, expected Unicode text")
     return value
 
 

@@ -160,5 +160,19 @@ TEST(Physical, SphereHidesWhatItCovers) {
   EXPECT_EQ(radiance(-0.41), open);
 }
 
+// Six spheres at one place: each hides less than 2 % of the surroundings, and must not be left out.
+TEST(Physical, SmallPartsAddUp) {
+  std::string six;
+  for (int i = 0; i < 6; ++i) six += R"(<geom type="sphere" size=".05" pos="0 0 .25"/>)";
+  TestRenderer s(std::string(kDark) +
+                 R"(<asset><material name="m" specular="0" rgba="0.2 0.2 0.2 1"/></asset><worldbody>
+    <geom type="plane" size="9 9 .1" material="m"/>)" +
+                 six + "</worldbody>");
+  s.options.physical = linear(60);
+  const auto radiance = [&](double x) { return decoded(s.center({x, 0, 0.04}, kX, kY, 0.01)[0]); };
+  const double each = 0.04 * std::pow(1 - std::pow(0.2 / 0.35, 2), 2) - 1.0 / 256;
+  EXPECT_NEAR(radiance(0) / radiance(-3), std::pow(1 - each, 6), 0.012);
+}
+
 }  // namespace
 }  // namespace mjsense::render

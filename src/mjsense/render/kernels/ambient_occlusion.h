@@ -26,7 +26,8 @@ struct Patch {
   float center[3], radius, normal[3], depth, bend;
 };
 
-// What hides a smaller part of the environment is left out.
+// What hides a smaller part of the environment is left out, and this part of all others, without which an
+// edge would be visible.
 constexpr float kLeastHidden = 1.0f / 256;
 
 // 1 at the geom and 0 where the square of the distance times `scale` is 1 or more.
