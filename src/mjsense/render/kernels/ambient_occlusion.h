@@ -70,7 +70,7 @@ std::uint32_t occluders_near(const OccluderBoxes& boxes, int i, const Patch& pat
     const Float more =
         fma(splat(patch.bend), fma(splat(2.0f), size, other), splat(patch.depth + 1e-5f));
     // Planes, which have no height, are kept.
-    height = select(area < splat(kEndless), min(d, top + more), d);
+    height = select(area < splat(kInfinity), min(d, top + more), d);
   }
   const Float most = height * area * fade(gap * gap, row(Boxes::kFade));
   return bits(splat(0.98f * kLeastHidden) * d * d * d < most);
