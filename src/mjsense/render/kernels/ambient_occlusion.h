@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // How much of the environment's light geoms hide from each other, by formula: boxes and planes exactly
-// where they are above the surface's horizon, other geoms as spheres. There is no noise, and no ray is
-// cast. Part of the tile kernels.
+// where they are above the surface's horizon, other geoms as spheres swept in a box. There is no noise, and
+// no ray is cast. Part of the tile kernels.
 
 #include <cmath>
 
@@ -20,20 +20,30 @@ struct Occluders {
   bool moving = false;  // some are not fixed
 };
 
-// A sphere around points, by how much they are below the surface at its center, and the greatest distance
-// of their unit normals from the one there.
+// Points of surfaces, by one of them and its unit normal.
 struct Patch {
-  float center[3], radius, normal[3], depth, bend;
+  float center[3], normal[3];
+  float radius;  // the greatest distance of a point from the center
+  float depth;   // how far points are below the plane through the center
+  float bend;    // the greatest distance of a normal from that of the center
 };
 
-// What hides a smaller part of the environment is left out, and this part of all others, without which an
-// edge would be visible.
+// Geoms that hide a smaller part of the environment are left out. It is subtracted from what the others
+// hide, so that images have no edge where a geom is left out.
 constexpr float kLeastHidden = 1.0f / 256;
+constexpr float kNearest = 1e-6f;  // m, the distance of what touches a point
 
 // 1 at the geom and 0 where the square of the distance times `scale` is 1 or more.
 inline Float fade(Float square, Float scale) {
   const Float left = max(fma(-square, scale, splat(1.0f)), splat(0.0f));
   return left * left;
+}
+
+// Whether what is seen at the distance d (m) or more, at most `height` above the horizon, may hide as much as
+// kLeastHidden. It covers at most area / d^2 of the hemisphere, which counts by the cosine height / d.
+// 2 % are for rounding.
+inline Mask may_hide(Float d, Float height, Float area) {
+  return splat(0.98f * kLeastHidden) * d * d * d < min(height, d) * area;
 }
 
 // Which of kWidth occluders, from number i on, may hide at least kLeastHidden from one of the points of a
@@ -59,10 +69,9 @@ std::uint32_t occluders_near(const OccluderBoxes& boxes, int i, const Patch& pat
       size = size + half;
     }
   }
-  // Bounds for all points: the distance, and the height above the horizon. What is seen at a height h in a
-  // distance d or more counts at most h / d.
+  // The least distance and the greatest height above the horizon for all points.
   const Float center = sqrt(square), area = row(Boxes::kArea);
-  const Float d = max(center - splat(patch.radius), splat(1e-6f));
+  const Float d = max(center - splat(patch.radius), splat(kNearest));
   const Float gap = max(d - row(Boxes::kRadius), splat(0.0f));
   Float height = d;
   if constexpr (horizon) {
@@ -70,10 +79,9 @@ std::uint32_t occluders_near(const OccluderBoxes& boxes, int i, const Patch& pat
     const Float more =
         fma(splat(patch.bend), fma(splat(2.0f), size, other), splat(patch.depth + 1e-5f));
     // Planes, which have no height, are kept.
-    height = select(area < splat(kInfinity), min(d, top + more), d);
+    height = select(area < splat(kInfinity), top + more, d);
   }
-  const Float most = height * area * fade(gap * gap, row(Boxes::kFade));
-  return bits(splat(0.98f * kLeastHidden) * d * d * d < most);
+  return bits(may_hide(d, height, area * fade(gap * gap, row(Boxes::kFade))));
 }
 
 // Finds those of `part` for points between `low` and `high`, in the memory of `scratch`.
@@ -198,8 +206,8 @@ class SeenBox {
   Float normal_[3], v_[3][2], square_[3][2], scale_[2][2][2];
 };
 
-// Part of the hemisphere around n that an occluder hides from p. Boxes are exact. Planes hide what is above
-// them, and others are spheres, as near as they come.
+// Part of the hemisphere around n that occluder i, a geom of this type, hides from p in these lanes. The
+// sphere of a rounded geom is where it is nearest.
 inline Float hidden_by(const OccluderBoxes& boxes, int i, int type, Mask lanes, Vec3f p, Vec3f n) {
   using Boxes = OccluderBoxes;
   const auto value = [&](int k) { return splat(boxes.row(k)[i]); };
@@ -224,13 +232,11 @@ inline Float hidden_by(const OccluderBoxes& boxes, int i, int type, Mask lanes, 
   if (type == mjGEOM_BOX) {
     const float sizes[3] = {boxes.row(Boxes::kHalf)[i], boxes.row(Boxes::kHalf + 1)[i],
                             boxes.row(Boxes::kHalf + 2)[i]};
-    const Float near = fade(square, scale), d = sqrt(square);
+    const Float near = fade(square, scale), d = max(sqrt(square), splat(kNearest));
     Float top = zero;
     for (int k = 0; k < 3; ++k)
       top = top + fma(abs(normal[k]), value(Boxes::kHalf + k), -(normal[k] * local[k]));
-    const Mask some = lanes & (splat(kLeastHidden) * d * d * d <
-                               min(top, d + splat(1e-6f)) * value(Boxes::kArea) * near);
-    if (!any(some)) return zero;
+    if (!any(lanes & may_hide(d, top, value(Boxes::kArea) * near))) return zero;
     hidden = SeenBox(sizes, local, normal).hidden() * near;
   } else {
     const Float radius = value(Boxes::kRadius);
