@@ -143,13 +143,36 @@ TEST(Physical, WallHidesHalfOfTheSurroundings) {
   EXPECT_LT(corner, 0.68);
 }
 
+// The foot of a wall gets half of its light from the floor, which is red and receives three quarters of the
+// light there.
+TEST(Physical, FloorColoursTheWallThatStandsOnIt) {
+  for (const char* floor : {R"(type="plane" size="9 9 .1" rgba="1 0 0 1")",
+                            R"(type="box" size="9 9 1" pos="0 0 -1" rgba="1 0 0 1")",
+                            R"(type="box" size="9 9 1" pos="0 0 -1" material="red")"}) {
+    TestRenderer s(std::string(kDark) + R"(<asset>
+    <texture name="t" type="2d" builtin="flat" rgb1="1 0 0" width="32" height="8"/>
+    <material name="red" texture="t"/>
+    <material name="m" specular="0" rgba="0.4 0.4 0.4 1"/></asset><worldbody>
+    <geom type="box" size=".1 2 2" pos=".1 0 2" material="m"/><geom )" +
+                   floor + "/></worldbody>");
+    s.options.physical = linear(6);
+    const auto wall = [&] { return s.center({-1, 0, 0.01}, {0, -1, 0}, {0, 0, 1}, 0.01); };
+    const auto seen = wall();
+    s.options.physical.occlusion_reach = 0;
+    const double open = decoded(wall()[0]);
+    EXPECT_NEAR(decoded(seen[0]) / open, 0.5 + 0.5 * 0.75, 0.01) << floor;
+    for (int c : {1, 2}) EXPECT_NEAR(decoded(seen[c]) / open, 0.5, 0.01) << floor;
+  }
+}
+
 // A sphere of radius r whose centre is at the distance d above a surface hides r^2 / d^2 of the
 // surroundings, which the reach of 0.5 m lowers, and 7 r away nothing.
 TEST(Physical, SphereHidesWhatItCovers) {
   TestRenderer s(std::string(kDark) +
                  R"(<asset><material name="m" specular="0" rgba="0.2 0.2 0.2 1"/></asset><worldbody>
     <geom type="plane" size="9 9 .1" material="m"/>
-    <geom type="sphere" size=".05" pos="0 0 .1"/><geom type="sphere" size=".1" pos="2 0 .2"/></worldbody>)");
+    <geom type="sphere" size=".05" pos="0 0 .1" rgba="0 0 0 1"/>
+    <geom type="sphere" size=".1" pos="2 0 .2" rgba="0 0 0 1"/></worldbody>)");
   s.options.physical = linear(8);
   s.options.physical.occlusion_reach = 0;
   const auto radiance = [&](double x) { return decoded(s.center({x, 0, 0.04}, kX, kY, 0.01)[0]); };
@@ -163,7 +186,8 @@ TEST(Physical, SphereHidesWhatItCovers) {
 // Six spheres at one place: each hides less than 2 % of the surroundings, and must not be left out.
 TEST(Physical, SmallPartsAddUp) {
   std::string six;
-  for (int i = 0; i < 6; ++i) six += R"(<geom type="sphere" size=".05" pos="0 0 .25"/>)";
+  for (int i = 0; i < 6; ++i)
+    six += R"(<geom type="sphere" size=".05" pos="0 0 .25" rgba="0 0 0 1"/>)";
   TestRenderer s(std::string(kDark) +
                  R"(<asset><material name="m" specular="0" rgba="0.2 0.2 0.2 1"/></asset><worldbody>
     <geom type="plane" size="9 9 .1" material="m"/>)" +

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How much of the environment's light geoms hide from each other, by formula: boxes and planes exactly
-// where they are above the surface's horizon, other geoms as spheres swept in a box. There is no noise, and
-// no ray is cast. Part of the tile kernels.
+// How much of the environment's light geoms hide from each other, where they are and what colour they have,
+// by formula: planes exactly, boxes by the solid angle that they cover, other geoms as spheres swept in a
+// box. There is no noise, and no ray is cast. Part of the tile kernels.
 
 #include <cmath>
 
@@ -32,6 +32,9 @@ struct Patch {
 // hide, so that images have no edge where a geom is left out.
 constexpr float kLeastHidden = 1.0f / 256;
 constexpr float kNearest = 1e-6f;  // m, the distance of what touches a point
+
+// The square root, or less below 1e-12.
+inline Float length_of(Float square) { return square * inverse_sqrt(max(square, splat(1e-12f))); }
 
 // 1 at the geom and 0 where the square of the distance times `scale` is 1 or more.
 inline Float fade(Float square, Float scale) {
@@ -70,7 +73,7 @@ std::uint32_t occluders_near(const OccluderBoxes& boxes, int i, const Patch& pat
     }
   }
   // The least distance and the greatest height above the horizon for all points.
-  const Float center = sqrt(square), area = row(Boxes::kArea);
+  const Float center = length_of(square), area = row(Boxes::kArea);
   const Float d = max(center - splat(patch.radius), splat(kNearest));
   const Float gap = max(d - row(Boxes::kRadius), splat(0.0f));
   Float height = d;
@@ -78,8 +81,10 @@ std::uint32_t occluders_near(const OccluderBoxes& boxes, int i, const Patch& pat
     const Float other = center + splat(patch.radius);  // the greatest distance
     const Float more =
         fma(splat(patch.bend), fma(splat(2.0f), size, other), splat(patch.depth + 1e-5f));
+    // A sphere that is cut by the horizon counts less than if its half were above.
+    const Float counted = max(top, splat(0.5f) * (top + row(Boxes::kRadius)));
     // Planes, which have no height, are kept.
-    height = select(area < splat(kInfinity), top + more, d);
+    height = select(area < splat(kInfinity), counted + more, d);
   }
   return bits(may_hide(d, height, area * fade(gap * gap, row(Boxes::kFade))));
 }
@@ -127,6 +132,23 @@ inline Float relative_arc(Float cosine, Float square_sine) {
   return select(acute, ratio, fma(inverse_sine, splat(0.5f), -ratio));
 }
 
+// Part of the cosine-weighted hemisphere around a normal that a geom hides, and the direction of the geom
+// (unit length, in the geom's frame).
+struct Hidden {
+  Float part;
+  Vec3f toward;
+};
+
+// Part of the cosine-weighted hemisphere around a normal that a cone hides. `sine`: of its half angle,
+// `cosine`: of its axis to the normal. Exact where the cone is above or below the horizon, and where it is
+// a half space; otherwise within 0.04.
+inline Float above_horizon(Float sine, Float cosine) {
+  const Float whole = sine * sine, square = whole * whole, fourth = square * square;
+  const Float low = max(cosine, -sine) + sine, high = sine - cosine;
+  const Float cut = splat(0.25f) * sine * low * fma(high, fourth * fourth, low);
+  return select(sine < cosine, whole * cosine, cut);
+}
+
 // A box as seen from points, in the box's frame, mirrored so that each point is on the positive side of
 // every axis: only the three faces there can face it. Index 0 is the nearer end of an axis, 1 the other.
 class SeenBox {
@@ -135,7 +157,10 @@ class SeenBox {
     for (int axis = 0; axis < 3; ++axis) {
       const Float away = abs(at[axis]);
       faces_[axis] = splat(half[axis]) < away;
-      normal_[axis] = select(at[axis] < splat(0.0f), -normal[axis], normal[axis]);
+      seen_[axis] = select(faces_[axis], splat(1.0f), splat(0.0f));
+      sum_[axis] = splat(0.0f);
+      below_[axis] = at[axis] < splat(0.0f);
+      normal_[axis] = select(below_[axis], -normal[axis], normal[axis]);
       for (int end = 0; end < 2; ++end) {
         v_[axis][end] = splat(end == 0 ? half[axis] : -half[axis]) - away;
         square_[axis][end] = v_[axis][end] * v_[axis][end];
@@ -143,32 +168,32 @@ class SeenBox {
     }
   }
 
-  // Part of the cosine-weighted hemisphere around the normal that the faces hide, by Lambert's formula
-  // for polygons. Faces share corners and edges.
-  Float hidden() {
+  // What the faces hide. Lambert's formula for polygons gives a vector, the sum over the edges of the
+  // outline: its length is the part that would be hidden if the normal had its direction. The horizon cuts
+  // the outline like a cone for which this part is the same.
+  Hidden hidden() {
     const bool x = any(faces_[0]), y = any(faces_[1]), z = any(faces_[2]);
-    if (x || y || z) find_scale(0, 0, 0);
     if (y || z) find_scale(1, 0, 0);
     if (z || x) find_scale(0, 1, 0);
     if (x || y) find_scale(0, 0, 1);
-    Float near[3] = {splat(0.0f), splat(0.0f), splat(0.0f)};  // the edges from the nearest corner
-    if (y || z) near[0] = edge<0>(0, 0);
-    if (z || x) near[1] = edge<1>(0, 0);
-    if (x || y) near[2] = edge<2>(0, 0);
-    Float sum = splat(0.0f);
-    if (x) {
-      find_scale(0, 1, 1);
-      add<0>(near, sum);
-    }
-    if (y) {
-      find_scale(1, 0, 1);
-      add<1>(near, sum);
-    }
-    if (z) {
-      find_scale(1, 1, 0);
-      add<2>(near, sum);
-    }
-    return sum;
+    if (x) add_far_edges<0>();
+    if (y) add_far_edges<1>();
+    if (z) add_far_edges<2>();
+    find_scale(0, 0, 0);
+    add_near_edge<0>();
+    add_near_edge<1>();
+    add_near_edge<2>();
+    const auto dot3 = [&](const Float* v) {
+      return fma(sum_[0], v[0], fma(sum_[1], v[1], sum_[2] * v[2]));
+    };
+    const Float square = max(dot3(sum_), splat(1e-12f)), scale = inverse_sqrt(square);
+    const Float length = min(square * scale, splat(1.0f));  // the part around its own direction
+    const Float part = above_horizon(length * inverse_sqrt(length), dot3(normal_) * scale);
+    const auto mirrored = [&](int axis) {
+      const Float v = sum_[axis] * scale;
+      return select(below_[axis], -v, v);
+    };
+    return {part, {mirrored(0), mirrored(1), mirrored(2)}};
   }
 
  private:
@@ -177,10 +202,10 @@ class SeenBox {
     scale_[i][j][k] = inverse_sqrt(max(square, splat(1e-12f)));
   }
 
-  // The term of the edge along an axis, from its nearer to its farther end, which is at the ends j and k
-  // of the next two axes.
+  // Adds `factor` times the edge along an axis, from its nearer to its farther end, which is at the ends j
+  // and k of the next two axes.
   template <int axis>
-  Float edge(int j, int k) const {
+  void add_edge(int j, int k, Float factor) {
     constexpr int b = (axis + 1) % 3, c = (axis + 2) % 3;
     int from[3] = {}, to[3] = {};
     from[b] = to[b] = j;
@@ -190,25 +215,40 @@ class SeenBox {
     const Float across = square_[b][j] + square_[c][k];
     const Float cosine = fma(v_[axis][0], v_[axis][1], across) * scale;
     const Float length = splat(2 * half_[axis]) * scale;
-    const Float turned = fma(v_[c][k], normal_[b], -(v_[b][j] * normal_[c]));
-    return turned * length * relative_arc(cosine, across * length * length);
+    const Float arc = factor * length * relative_arc(cosine, across * length * length);
+    sum_[b] = fma(v_[c][k], arc, sum_[b]);
+    sum_[c] = fma(-v_[b][j], arc, sum_[c]);
   }
 
+  // The edges of a face that end at its farthest corner.
   template <int axis>
-  void add(const Float* near, Float& sum) const {
+  void add_far_edges() {
     constexpr int b = (axis + 1) % 3, c = (axis + 2) % 3;
-    const Float face = near[b] - near[c] + edge<c>(0, 1) - edge<b>(1, 0);
-    sum = sum + select(faces_[axis], max(face, splat(0.0f)), splat(0.0f));
+    int corner[3] = {1, 1, 1};
+    corner[axis] = 0;
+    find_scale(corner[0], corner[1], corner[2]);
+    add_edge<c>(0, 1, seen_[axis]);
+    add_edge<b>(1, 0, -seen_[axis]);
+  }
+
+  // The edge that starts at the nearest corner, which is inside the outline if both of its faces are seen.
+  template <int axis>
+  void add_near_edge() {
+    constexpr int b = (axis + 1) % 3, c = (axis + 2) % 3;
+    const Float factor = seen_[c] - seen_[b];
+    if (any(splat(0.0f) < abs(factor))) add_edge<axis>(0, 0, factor);
   }
 
   const float* half_;
-  Mask faces_[3];
+  Mask faces_[3], below_[3];
+  Float seen_[3];  // 1: the face is seen, 0: it is not
+  Float sum_[3];
   Float normal_[3], v_[3][2], square_[3][2], scale_[2][2][2];
 };
 
-// Part of the hemisphere around n that occluder i, a geom of this type, hides from p in these lanes. The
-// sphere of a rounded geom is where it is nearest.
-inline Float hidden_by(const OccluderBoxes& boxes, int i, int type, Mask lanes, Vec3f p, Vec3f n) {
+// What occluder i, a geom of this type, hides from p in these lanes. The sphere of a rounded geom is where
+// it is nearest.
+inline Hidden hidden_by(const OccluderBoxes& boxes, int i, int type, Mask lanes, Vec3f p, Vec3f n) {
   using Boxes = OccluderBoxes;
   const auto value = [&](int k) { return splat(boxes.row(k)[i]); };
   const auto turned = [&](Vec3f v, int k) {
@@ -224,29 +264,35 @@ inline Float hidden_by(const OccluderBoxes& boxes, int i, int type, Mask lanes, 
   }
   const Float square = fma(away[0], away[0], fma(away[1], away[1], away[2] * away[2]));
   const Float scale = value(Boxes::kFade);
+  Hidden out{zero, {zero, zero, -one}};
   if (type == mjGEOM_PLANE) {
     const Mask over = lanes & (zero < away[2]) & (max(abs(away[0]), abs(away[1])) < splat(1e-6f));
-    return select(over, fma(normal[2], -half, half) * fade(square, scale), zero);
+    out.part = select(over, fma(normal[2], -half, half) * fade(square, scale), zero);
+    return out;
   }
-  Float hidden;
   if (type == mjGEOM_BOX) {
     const float sizes[3] = {boxes.row(Boxes::kHalf)[i], boxes.row(Boxes::kHalf + 1)[i],
                             boxes.row(Boxes::kHalf + 2)[i]};
-    const Float near = fade(square, scale), d = max(sqrt(square), splat(kNearest));
+    const Float near = fade(square, scale);
+    const Float d = max(length_of(square), splat(kNearest));
     Float top = zero;
     for (int k = 0; k < 3; ++k)
       top = top + fma(abs(normal[k]), value(Boxes::kHalf + k), -(normal[k] * local[k]));
-    if (!any(lanes & may_hide(d, top, value(Boxes::kArea) * near))) return zero;
-    hidden = SeenBox(sizes, local, normal).hidden() * near;
+    if (!any(lanes & may_hide(d, top, value(Boxes::kArea) * near))) return out;
+    out = SeenBox(sizes, local, normal).hidden();
+    out.part = out.part * near;
   } else {
     const Float radius = value(Boxes::kRadius);
     const Float closeness = inverse_sqrt(max(square, splat(1e-12f)));
     const Float gap = max(fma(square, closeness, -radius), zero);
     const Float size = min(radius * closeness, one);
-    const Float along = fma(away[0], normal[0], fma(away[1], normal[1], away[2] * normal[2]));
-    hidden = max(-along * closeness, zero) * size * size * fade(gap * gap, scale);
+    out.toward = {-away[0] * closeness, -away[1] * closeness, -away[2] * closeness};
+    const Float along =
+        fma(out.toward.x, normal[0], fma(out.toward.y, normal[1], out.toward.z * normal[2]));
+    out.part = above_horizon(size, along) * fade(gap * gap, scale);
   }
-  return select(lanes, max(hidden - splat(kLeastHidden), zero), zero);
+  out.part = select(lanes, max(out.part - splat(kLeastHidden), zero), zero);
+  return out;
 }
 
 inline Patch patch_of(const Surfaces& s, std::uint32_t lanes) {
@@ -270,10 +316,45 @@ inline Patch patch_of(const Surfaces& s, std::uint32_t lanes) {
   return out;
 }
 
-// Part of the environment's light that reaches the points of `lanes`, 0..1.
-inline void open_sky(const View& view, const Occluders& tile, const Surfaces& s, const Hits& hits,
-                     std::uint32_t lanes, float* out) {
-  for (int k = 0; k < kLanes; k += kWidth) store(out + k, splat(1.0f));
+// What is left of the environment for points of surfaces, and what is there instead.
+struct alignas(64) Openness {
+  float visible[kLanes];  // part of the environment, 0..1
+  // Sums over the geoms that hide the environment, weighted by the parts that they hide: 1, their direction
+  // in the camera's frame, and their colour.
+  float weight[kLanes], toward[3][kLanes], color[3][kLanes];
+
+  Openness() {
+    for (int k = 0; k < kLanes; k += kWidth) {
+      store(visible + k, splat(1.0f));
+      store(weight + k, splat(0.0f));
+      for (int c = 0; c < 3; ++c) {
+        store(toward[c] + k, splat(0.0f));
+        store(color[c] + k, splat(0.0f));
+      }
+    }
+  }
+
+  // Adds what occluder i hides from lanes k .. k + kWidth - 1.
+  void add(const OccluderBoxes& boxes, int i, int k, const Hidden& hidden) {
+    using Boxes = OccluderBoxes;
+    const Float part = hidden.part;
+    store(visible + k, load(visible + k) * (splat(1.0f) - min(part, splat(1.0f))));
+    store(weight + k, load(weight + k) + part);
+    for (int c = 0; c < 3; ++c) {
+      const auto value = [&](int row) { return splat(boxes.row(row)[i]); };
+      const int row = Boxes::kRotation + 3 * c;
+      const Float along =
+          fma(value(row), hidden.toward.x,
+              fma(value(row + 1), hidden.toward.y, value(row + 2) * hidden.toward.z));
+      store(toward[c] + k, fma(part, along, load(toward[c] + k)));
+      store(color[c] + k, fma(part, value(Boxes::kColor + c), load(color[c] + k)));
+    }
+  }
+};
+
+// Adds what the geoms near a tile hide from the points of `lanes`.
+inline void find_openness(const View& view, const Occluders& tile, const Surfaces& s,
+                          const Hits& hits, std::uint32_t lanes, Openness& out) {
   if (!lanes) return;
   const Patch patch = patch_of(s, lanes);
   for (int first = 0; first < tile.count; first += kWidth) {
@@ -285,8 +366,8 @@ inline void open_sky(const View& view, const Occluders& tile, const Surfaces& s,
       for (int k = 0; k < kLanes; k += kWidth) {
         const Mask other = mask_of(lanes >> k & kAllLanes) & ~(load(hits.geom + k) == int_of(g));
         if (!any(other)) continue;
-        const Float hidden = hidden_by(tile.boxes, i, type, other, load3(s.p, k), load3(s.n, k));
-        store(out + k, load(out + k) * (splat(1.0f) - min(hidden, splat(1.0f))));
+        const Hidden hidden = hidden_by(tile.boxes, i, type, other, load3(s.p, k), load3(s.n, k));
+        if (any(splat(0.0f) < hidden.part)) out.add(tile.boxes, i, k, hidden);
       }
     }
   }

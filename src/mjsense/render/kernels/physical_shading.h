@@ -159,18 +159,43 @@ inline Radiance environment_radiance(const Texture& map, Vec3f d, Float roughnes
   return mix(near, read(min(lower + one, splat(last))), between);
 }
 
-// Ambient visibility for a matte surface that itself reflects light into its corners.
-// J. Jimenez et al., Practical Realtime Strategies for Accurate Indirect Occlusion, 2016.
-inline Float with_bounces(Float open, Float albedo) {
-  const Float a = fma(splat(2.0404f), albedo, splat(-0.3324f)),
-              b = fma(splat(-4.7951f), albedo, splat(0.6417f)),
-              c = fma(splat(2.7552f), albedo, splat(0.6903f));
-  return max(open, fma(fma(open, a, b), open, c) * open);
+// The radiance of a white matte surface of normal n in the light of the environment.
+inline Radiance white_radiance(const PhysicalView& v, Vec3f n) {
+  const Float terms[9] = {n.x,       n.y,       n.z,       n.x * n.x, n.y * n.y,
+                          n.z * n.z, n.x * n.y, n.x * n.z, n.y * n.z};
+  Float out[3];
+  for (int c = 0; c < 3; ++c) {
+    out[c] = splat(v.irradiance[0][c]);
+    for (int i = 0; i < 9; ++i) out[c] = fma(terms[i], splat(v.irradiance[i + 1][c]), out[c]);
+    out[c] = max(out[c], splat(0.0f));
+  }
+  return {out[0], out[1], out[2]};
 }
 
-// Adds the light of the environment. `open`: from open_sky().
+// The same where geoms hide a part of the environment: without the light from their direction, and with what
+// they reflect. They are lit from the opposite direction. How much of that light reaches them is not known;
+// it is the mean of all and of the part that reaches this surface.
+inline Radiance white_radiance(const PhysicalView& v, Vec3f n, const Openness& open, int k) {
+  const Radiance whole = white_radiance(v, n);
+  const Float weight = load(open.weight + k), zero = splat(0.0f), one = splat(1.0f);
+  if (!any(zero < weight)) return whole;
+  const Vec3f toward = load3(open.toward, k);
+  const Float scale = inverse_sqrt(max(dot(toward, toward), splat(1e-12f)));
+  const Vec3f d{toward.x * scale, toward.y * scale, toward.z * scale};
+  const Radiance behind = white_radiance(v, d), across = white_radiance(v, {-d.x, -d.y, -d.z});
+  const Float visible = load(open.visible + k), hidden = one - visible;
+  const Float share = hidden / max(weight, splat(1e-6f)) * fma(visible, splat(0.5f), splat(0.5f));
+  const auto lit = [&](Float all, Float blocked, Float reflected, const float* color) {
+    return fma(share * load(color + k), reflected, max(fma(-hidden, blocked, all), zero));
+  };
+  return {lit(whole.r, behind.r, across.r, open.color[0]),
+          lit(whole.g, behind.g, across.g, open.color[1]),
+          lit(whole.b, behind.b, across.b, open.color[2])};
+}
+
+// Adds the light of the environment.
 inline void add_ambient(const View& view, const Surfaces& s, const Reflectances& r,
-                        const ToEye& eye, int k, const float* open, Colors& sum) {
+                        const ToEye& eye, int k, const Openness& open, Colors& sum) {
   const PhysicalView& v = view.physical;
   const Vec3f n = load3(s.n, k), p = load3(s.p, k);
   const Float to_eye = load(eye.scale + k), nv = dot(n, p) * to_eye;
@@ -180,21 +205,15 @@ inline void add_ambient(const View& view, const Surfaces& s, const Reflectances&
                        fma(splat(2.0f) * nv, n.z, -(p.z * to_eye))};
   const Radiance ahead =
       environment_radiance(*v.radiance, from_geom(v.r_ec, mirrored), load(s.roughness + k));
-  const Float visible = load(open + k);
+  const Float creases = load(s.occlusion + k), visible = load(open.visible + k) * creases;
   // Filament 5.6.2 (Lagarde): surfaces mirror what is above their horizon.
   const Float seen = load(r.cosine + k) + visible;
   const Float gloss = min(max(fma(seen, seen, visible - splat(1.0f)), splat(0.0f)), splat(1.0f));
-  const Float terms[9] = {n.x,       n.y,       n.z,       n.x * n.x, n.y * n.y,
-                          n.z * n.z, n.x * n.y, n.x * n.z, n.y * n.z};
-  const Float radiance[3] = {ahead.r, ahead.g, ahead.b};
+  const Radiance white = white_radiance(v, n, open, k);
+  const Float around[3] = {white.r, white.g, white.b}, radiance[3] = {ahead.r, ahead.g, ahead.b};
   for (int c = 0; c < 3; ++c) {
-    Float irradiance = splat(v.irradiance[0][c]);
-    for (int i = 0; i < 9; ++i)
-      irradiance = fma(terms[i], splat(v.irradiance[i + 1][c]), irradiance);
-    const Float matte = load(r.matte[c] + k);
-    const Float around = max(irradiance, splat(0.0f)) * with_bounces(visible, matte);
     const Float shine = load(r.albedo[c] + k) * (gloss * splat(v.radiance_scale[c]));
-    const Float add = fma(matte, around, shine * radiance[c]);
+    const Float add = fma(load(r.matte[c] + k) * creases, around[c], shine * radiance[c]);
     store(sum.rgb[c] + k, load(sum.rgb[c] + k) + add);
   }
 }
@@ -219,16 +238,10 @@ inline void shade_physical(const View& view, const Surfaces& s, const Hits& hits
     for (int k = 0; k < kLanes; k += kWidth)
       add_direct(light, lit.terms[k / kWidth], s, r, eye, k, dark, out);
   }
-  alignas(64) float open[kLanes];
-  if (shadows && view.physical.occlusion_reach > 0) {
-    open_sky(view, shadows->near, s, hits, lanes, open);
-  } else {
-    for (int k = 0; k < kLanes; k += kWidth) store(open + k, splat(1.0f));
-  }
-  for (int k = 0; k < kLanes; k += kWidth) {
-    store(open + k, load(open + k) * load(s.occlusion + k));
-    add_ambient(view, s, r, eye, k, open, out);
-  }
+  Openness open;
+  if (shadows && view.physical.occlusion_reach > 0)
+    find_openness(view, shadows->near, s, hits, lanes, open);
+  for (int k = 0; k < kLanes; k += kWidth) add_ambient(view, s, r, eye, k, open, out);
   if (view.fog.slope == 0) return;
   for (int c = 0; c < 3; ++c)
     for (int k = 0; k < kLanes; k += kWidth)

@@ -2,6 +2,8 @@
 #pragma once
 // The surface of a geom: its material as the kernels draw it.
 
+#include <array>
+
 #include "mjsense/render/view/appearance.h"
 #include "mjsense/render/view/surface_assets.h"
 #include "mjsense/render/view/view_geom.h"
@@ -36,6 +38,9 @@ struct Paint {
 // Sets `surface` and `transparent` of `g`, whose shape is set. `source`: the geom in the world.
 void set_surface(const SurfaceStyle& style, const rays::RayGeom& source, const Paint& paint,
                  ViewGeom& g);
+
+// The mean of its colours, linear, in a physically based view. Of a cube map, the first face counts.
+std::array<float, 3> mean_color(const Surface& surface);
 
 // Computes Surface::highlight_threshold: the value below which the kernels' power() returns 0, with a margin for
 // rounding. power() returns 0 for x below 0.3 if the exponent is at least 4, and where x^exponent

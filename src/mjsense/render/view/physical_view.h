@@ -65,7 +65,9 @@ struct OccluderBoxes {
   // Radius of the sphere (0: a box), 1 / the square of the distance from the surface up to which the geom
   // hides the environment, and a bound: at a distance d from the box it hides at most area / d^2 of the
   // hemisphere (0: nothing).
-  static constexpr int kRadius = 15, kFade = 16, kArea = 17, kRows = 18;
+  static constexpr int kRadius = 15, kFade = 16, kArea = 17;
+  static constexpr int kColor = 18;  // the mean colour of its surface, linear
+  static constexpr int kRows = 21;
   float* values = nullptr;
   std::size_t stride = 0;
 
