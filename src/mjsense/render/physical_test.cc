@@ -183,6 +183,18 @@ TEST(Physical, SphereHidesWhatItCovers) {
   EXPECT_EQ(radiance(-0.41), open);
 }
 
+// A mesh of two small parts: the box around it is empty in the middle, where nothing is hidden.
+TEST(Physical, MeshHidesNothingInTheMiddleOfItsBox) {
+  TestRenderer s(std::string(kDark) +
+                 R"(<asset><mesh name="m" vertex="-.3 -.1 -.1  -.3 .1 -.1  -.29 0 .1  -.31 0 .1
+       .3 -.1 -.1  .3 .1 -.1  .29 0 .1  .31 0 .1" face="0 2 1  0 1 3  0 3 2  1 2 3  4 6 5  4 5 7  4 7 6  5 6 7"/></asset>
+    <worldbody><geom type="plane" size="9 9 .1" rgba=".4 .4 .4 1"/><geom type="mesh" mesh="m" rgba="0 0 0 1"/></worldbody>)");
+  s.options.physical = linear(6);
+  const auto radiance = [&](double x) { return decoded(s.center({x, 0, 1}, kX, kY, 0.01)[0]); };
+  EXPECT_EQ(radiance(0), radiance(-3));
+  EXPECT_LT(radiance(0.33), 0.9 * radiance(-3));
+}
+
 // Six spheres at one place: each hides less than 2 % of the surroundings, and must not be left out.
 TEST(Physical, SmallPartsAddUp) {
   std::string six;

@@ -285,7 +285,10 @@ inline Hidden hidden_by(const OccluderBoxes& boxes, int i, int type, Mask lanes,
     const Float radius = value(Boxes::kRadius);
     const Float closeness = inverse_sqrt(max(square, splat(1e-12f)));
     const Float gap = max(fma(square, closeness, -radius), zero);
-    const Float size = min(radius * closeness, one);
+    // Within the sphere the shape is not known: it hides less and less, and nothing in its middle.
+    Float size = radius * closeness;
+    const Mask within = one < size;
+    if (any(within)) size = select(within, one / size, size);
     out.toward = {-away[0] * closeness, -away[1] * closeness, -away[2] * closeness};
     const Float along =
         fma(out.toward.x, normal[0], fma(out.toward.y, normal[1], out.toward.z * normal[2]));
