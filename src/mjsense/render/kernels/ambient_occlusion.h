@@ -44,9 +44,14 @@ inline Float fade(Float square, Float scale) {
 
 // Whether what is seen at the distance d (m) or more, at most `height` above the horizon, may hide as much as
 // kLeastHidden. It covers at most area / d^2 of the hemisphere, which counts by the cosine height / d.
-// 2 % are for rounding.
-inline Mask may_hide(Float d, Float height, Float area) {
-  return splat(0.98f * kLeastHidden) * d * d * d < min(height, d) * area;
+// `fades`: from fade(). 2 % are for rounding.
+inline Mask may_hide(Float d, Float height, Float area, Float fades) {
+  return splat(0.98f * kLeastHidden) * d * d * d < max(min(height, d), splat(0.0f)) * area * fades;
+}
+// The area of a box, or less if it hides less because it is low: of the hemisphere, half of the directions
+// below the height are height^2 / (2 d^2).
+inline Float area_above(Float d, Float height, Float area) {
+  return min(area, splat(0.5f) * d * max(min(height, d), splat(0.0f)));
 }
 
 // Which of kWidth occluders, from number i on, may hide at least kLeastHidden from one of the points of a
@@ -73,7 +78,8 @@ std::uint32_t occluders_near(const OccluderBoxes& boxes, int i, const Patch& pat
     }
   }
   // The least distance and the greatest height above the horizon for all points.
-  const Float center = length_of(square), area = row(Boxes::kArea);
+  const Float center = length_of(square);
+  Float area = row(Boxes::kArea);
   const Float d = max(center - splat(patch.radius), splat(kNearest));
   const Float gap = max(d - row(Boxes::kRadius), splat(0.0f));
   Float height = d;
@@ -86,7 +92,9 @@ std::uint32_t occluders_near(const OccluderBoxes& boxes, int i, const Patch& pat
     // Planes, which have no height, are kept.
     height = select(area < splat(kInfinity), counted + more, d);
   }
-  return bits(may_hide(d, height, area * fade(gap * gap, row(Boxes::kFade))));
+  if constexpr (horizon)
+    area = select(splat(0.0f) < row(Boxes::kRadius), area, area_above(d, height, area));
+  return bits(may_hide(d, height, area, fade(gap * gap, row(Boxes::kFade))));
 }
 
 // Finds those of `part` for points between `low` and `high`, in the memory of `scratch`.
@@ -278,7 +286,7 @@ inline Hidden hidden_by(const OccluderBoxes& boxes, int i, int type, Mask lanes,
     Float top = zero;
     for (int k = 0; k < 3; ++k)
       top = top + fma(abs(normal[k]), value(Boxes::kHalf + k), -(normal[k] * local[k]));
-    if (!any(lanes & may_hide(d, top, value(Boxes::kArea) * near))) return out;
+    if (!any(lanes & may_hide(d, top, area_above(d, top, value(Boxes::kArea)), near))) return out;
     out = SeenBox(sizes, local, normal).hidden();
     out.part = out.part * near;
   } else {
