@@ -48,6 +48,7 @@ inline Float fade(Float square, Float scale) {
 inline Mask may_hide(Float d, Float height, Float area, Float fades) {
   return splat(0.98f * kLeastHidden) * d * d * d < max(min(height, d), splat(0.0f)) * area * fades;
 }
+
 // The area of a box, or less if it hides less because it is low: of the hemisphere, half of the directions
 // below the height are height^2 / (2 d^2).
 inline Float area_above(Float d, Float height, Float area) {

@@ -129,20 +129,9 @@ float highlight_threshold_of(float exponent) {
 }
 
 std::array<float, 3> mean_color(const Surface& s) {
-  static const std::array<float, 256> linear = [] {
-    std::array<float, 256> out;
-    for (int i = 0; i < 256; ++i) out[i] = static_cast<float>(srgb_decode(i / 255.0));
-    return out;
-  }();
   std::array<float, 3> out = {s.rgba[0], s.rgba[1], s.rgba[2]};
   if (!s.texture) return out;
-  const int last = s.texture->levels - 1;
-  if (s.texture->finest > last) s.texture->on_demand->add_level(last);
-  const std::uint32_t texel = s.texture->texels[s.texture->offset[last]];
-  for (int c = 0; c < 3; ++c) {
-    const std::uint32_t value = texel >> 8 * c & 0xff;
-    out[c] *= s.texture->linear ? static_cast<float>(value) / 255 : linear[value];
-  }
+  for (int c = 0; c < 3; ++c) out[c] *= s.texture->mean[c];
   return out;
 }
 

@@ -39,7 +39,7 @@ struct Paint {
 void set_surface(const SurfaceStyle& style, const rays::RayGeom& source, const Paint& paint,
                  ViewGeom& g);
 
-// The mean of its colours, linear, in a physically based view. Of a cube map, the first face counts.
+// The mean of its colours, linear, in a physically based view.
 std::array<float, 3> mean_color(const Surface& surface);
 
 // Computes Surface::highlight_threshold: the value below which the kernels' power() returns 0, with a margin for

@@ -261,6 +261,26 @@ void fill_levels(const SourceRows& source, int image, StoredTexture& out) {
   }
 }
 
+// Sets the mean of a texture of three or four channels.
+void set_mean(const mjModel* model, int id, Texture& out) {
+  static const std::array<double, 256> linear = [] {
+    std::array<double, 256> table;
+    for (int i = 0; i < 256; ++i) table[i] = srgb_decode(i / 255.0);
+    return table;
+  }();
+  const int channels = model->tex_nchannel[id], width = model->tex_width[id];
+  const int height = out.cube ? width : model->tex_height[id];
+  const mjtByte* texels = model->tex_data + model->tex_adr[id];
+  const int columns = std::min(width, 32), rows = std::min(height, 32);
+  double sum[3] = {};
+  for (int y = 0; y < rows; ++y)
+    for (int x = 0; x < columns; ++x) {
+      const auto at = (y * height / rows) * static_cast<std::size_t>(width) + x * width / columns;
+      for (int c = 0; c < 3; ++c) sum[c] += linear[texels[at * channels + c]];
+    }
+  for (int c = 0; c < 3; ++c) out.mean[c] = static_cast<float>(sum[c] / (columns * rows));
+}
+
 }  // namespace
 
 Texture texture_levels(const mjModel* model, int id) {
@@ -283,6 +303,7 @@ Texture texture_levels(const mjModel* model, int id) {
     if (width == 1 && height == 1) break;
   }
   texture.finest = texture.levels;
+  if (!texture.grey) set_mean(model, id, texture);
   return texture;
 }
 
