@@ -328,7 +328,7 @@ inline Patch patch_of(const Surfaces& s, std::uint32_t lanes) {
   return out;
 }
 
-// What is left of the environment for points of surfaces, and what is there instead.
+// The part of the environment that points of surfaces see, and the geoms that hide the rest.
 struct alignas(64) Openness {
   float visible[kLanes];  // part of the environment, 0..1
   // Sums over the geoms that hide the environment, weighted by the parts that they hide: 1, their direction
