@@ -261,7 +261,7 @@ void fill_levels(const SourceRows& source, int image, StoredTexture& out) {
   }
 }
 
-// Sets the mean of a texture of three or four channels.
+// Sets the mean colour of a texture of three or four channels.
 void set_mean(const mjModel* model, int id, Texture& out) {
   static const std::array<double, 256> linear = [] {
     std::array<double, 256> table;

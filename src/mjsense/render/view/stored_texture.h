@@ -32,10 +32,10 @@ struct Texture {
   bool grey = false;        // it has one channel and is not used for colours
   bool linear = false;      // its colours were decoded from sRGB when they were stored
   bool same_faces = false;  // a cube map with one image for all faces, which is stored once
-  float mean[3] = {1, 1,
-                   1};  // linear colour, the mean of at most 32 x 32 texels of the first image
-  int levels = 0;       // of the mipmap; 0: the texture cannot be drawn
-  int finest = 0;       // the finest level that is stored
+  int levels = 0;           // of the mipmap; 0: the texture cannot be drawn
+  int finest = 0;           // the finest level that is stored
+  // The linear colour of its first image, as the mean of at most 32 x 32 texels.
+  float mean[3] = {1, 1, 1};
   TextureOnDemand* on_demand = nullptr;   // stores finer levels; null if all are stored
   const std::uint32_t* texels = nullptr;  // R in the lowest byte
   float width[kMaxLevels] = {}, height[kMaxLevels] = {};  // by level, texels

@@ -69,9 +69,7 @@ void ViewGeoms::set_occluders(View& view) {
     // At most three faces of a box are seen. The cosines of a hemisphere have the integral pi.
     const float faces = 4 * (half[0] * half[1] + half[1] * half[2] + half[2] * half[0]);
     const float area = plane ? kEndless : box ? faces / std::numbers::pi_v<float> : radius * radius;
-    const bool hides = hides_environment(g);
-    set(Boxes::kArea, i, hides ? area : 0);
-    if (!hides) continue;
+    set(Boxes::kArea, i, hides_environment(g) ? area : 0);
     const std::array<float, 3> color = mean_color(g.surface);
     for (int c = 0; c < 3; ++c) set(Boxes::kColor + c, i, color[c]);
   }
